@@ -12,8 +12,7 @@ if TYPE_CHECKING:
 __all__ = ["Check", "Claim", "Level", "Outcome", "Verdict", "validate"]
 
 pytest_plugins = ("compare.plugin",)
-"""Pytest's entry point is this package, not that module: a foreign ``compare`` has no such line,
-and breaks no run."""
+"""Pytest's entry point is this package: a foreign ``compare`` has no such line, and breaks none."""
 _MODULES = dict.fromkeys(("Claim", "Outcome", "Verdict"), "compare.claim") | {
     "Check": "compare.kit.record",
     "Level": "compare.kit.levels",
@@ -22,8 +21,7 @@ _MODULES = dict.fromkeys(("Claim", "Outcome", "Verdict"), "compare.claim") | {
 
 
 def __getattr__(name: str) -> Any:
-    """A name when it is asked for: engines and figures take a second to load, and `dualball
-    predict` needs neither."""
+    """A name when it is asked for: engines take a second to load, and `predict` needs none."""
     if name in _MODULES:
         return getattr(importlib.import_module(_MODULES[name]), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -10,8 +10,7 @@ from typing import NoReturn
 
 
 def main() -> NoReturn:
-    """The program; what ends it while it is still being imported ends it at once, since there is
-    nothing to keep."""
+    """The program; what ends it while it is being imported ends it at once: nothing is lost."""
 
     def leave(number: int, frame: FrameType | None) -> NoReturn:
         with suppress(OSError):  # standard error may be closed

@@ -149,8 +149,7 @@ class _Given:
 
 
 def _loosened(checks: Sequence[Check], share: float) -> tuple[Check, ...]:
-    """Checks whose numbers may be off by a share of their scales, since their errors have no
-    limit."""
+    """Checks whose numbers may be off by a share of their scales: they have no limit."""
     return tuple(
         replace(c, tolerance=share * c.scale, required=2 * share)
         if quantity(c.measurement.quantity).resolution
@@ -162,8 +161,7 @@ def _loosened(checks: Sequence[Check], share: float) -> tuple[Check, ...]:
 def _too_few(
     claim: Claim, checks: Sequence[Check], wanted: Counter[int], missing: Sequence[Missing]
 ) -> str:
-    """In words of which criteria too few numbers can tell, and what was not measured of these;
-    empty if of none."""
+    """In words of which criteria too few numbers can tell, and why; empty if of none."""
     if not (few := undecided_criteria(checks, wanted)):
         return ""
     symbols: dict[str, list[str]] = {}
@@ -179,8 +177,7 @@ def _too_few(
 
 
 def _deviations(checks: Iterable[Check]) -> tuple[float, ...]:
-    """Sizes of deviations divided by their scales, of checks that are certain enough to show
-    them."""
+    """Sizes of deviations divided by their scales, of checks that show them for sure."""
     numbers = (
         c
         for c in checks

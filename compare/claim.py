@@ -134,8 +134,7 @@ def criteria(
 
 
 def claim(id: str, source: str, statement: str, *criteria: Criterion, **more: Any) -> Claim:
-    """A claim with the criteria of the measurements that bear on it; `more` are other fields of
-    `Claim`."""
+    """A claim with the criteria that bear on it; `more` are other fields of `Claim`."""
     written = sys._getframe(1)
     file = Path(written.f_code.co_filename).relative_to(Path(__file__).parents[1])
     place = f"{file.as_posix()}:{written.f_lineno}"
@@ -151,8 +150,7 @@ class Judged:
 
     @property
     def worst(self) -> float:
-        """Largest deviation divided by its tolerance; inf where theory knows no such state, nan
-        without numbers."""
+        """Largest deviation divided by its tolerance; inf without a state, nan without numbers."""
         return max((check.share for check in self.checks), default=math.nan)
 
     @property
@@ -180,8 +178,7 @@ class EngineVerdict(Judged):
     reason: str = ""
     """Why it was not asked, or leaves the claim undecided."""
     order: float = math.nan
-    """Median of the orders in the time step with which the numbers converge; nan where the step
-    shows nothing."""
+    """Median of the orders with which the numbers converge; nan where the step shows nothing."""
     deviations: tuple[float, ...] = ()
     """Sizes of deviations, divided by their scales, of numbers that are sure enough to tell them:
     at MuJoCo's own step of 2 ms, or of an engine that is judged at one step at that."""

@@ -40,8 +40,7 @@ LOOSER, COARSEST = 300.0, 2e-2
 more than 2 %, unless that may, too. (Raised from 100 after a first measurement, when uncertainties
 were made three times as large.)"""
 NEAR = 0.1
-"""Largest difference of the conditions of two measurements of the same thing with different steps,
-by their size."""
+"""Largest difference of the conditions of one thing at different steps, by their size."""
 MARGIN = 0.03
 """Relative distance from a threshold below which no limit is taken of a settled state: with a step
 of a millisecond thresholds lie up to so far off, and so the step decides on the case. (Chosen after
@@ -57,8 +56,7 @@ LOWEST_ORDER = 0.75
 floor, a deviation may fall as the root of the step. (Chosen after that had been seen, at one
 threshold of 115.)"""
 ORDERS = 0.2, 2.5
-"""Between which an order is looked for: an engine of order 1 or 2 shows others where terms of
-several orders cancel."""
+"""Between which an order is looked for: others show where terms of several orders cancel."""
 LEAST_STEPS = 3
 """Time steps with which a number must have been measured to have a limit."""
 Ends = Set[tuple[str, float]]
@@ -104,8 +102,7 @@ class StepSeries:
 def zero_step_limits(
     found: Mapping[int, Sequence[Check]], finest: Mapping[str, int], ends: Ends
 ) -> list[Limit]:
-    """The limits of all checks that have one, by checks at each step divisor and the finest one of
-    each protocol."""
+    """The limits of all checks, by step divisor; `finest` is that of each protocol."""
     limits = (zero_step_limit(series, ends) for series in series_by_step(found, finest))
     return [limit for limit in limits if limit]
 
@@ -145,8 +142,7 @@ def _next_to_threshold(m: Measurement, ends: Ends) -> bool:
 
 
 def _hidden_by_brackets(series: StepSeries) -> float:
-    """What the last two brackets of a threshold may hide of a change with the step, taken to no
-    step."""
+    """What the last two brackets of a threshold may hide of a change with the step."""
     before, finest = series.divisors[-2:]
     return math.hypot(*series.uncertainties[-2:]) * before / (finest - before)
 
@@ -234,8 +230,7 @@ def _polynomial_limit(steps: Array, errors: Array, own: Array, lowest: int) -> E
 def series_by_step(
     found: Mapping[int, Sequence[Check]], finest: Mapping[str, int]
 ) -> Iterator[StepSeries]:
-    """Each check with the finest step of its protocol, and those of the same thing with coarser
-    ones."""
+    """Each check with its protocol's finest step, and those with coarser ones."""
     groups: dict[Alike, dict[int, list[Check]]] = {}
     for divisor in sorted(found):
         for check in found[divisor]:
@@ -255,8 +250,7 @@ def series_by_step(
 
 @dataclass(frozen=True)
 class Alike:
-    """What checks of one thing with different time steps share: all but the numbers among their
-    conditions."""
+    """What checks of one thing with different steps share: all but numeric conditions."""
 
     protocol: str
     criterion: int
@@ -288,7 +282,6 @@ def _pair_nearest(ones: Sequence[Check], others: Sequence[Check]) -> Iterator[tu
 
 
 def _numbers_of(m: Measurement) -> dict[str, float]:
-    """The numbers among the conditions of a measurement, and those of its parameters that protocols
-    choose."""
+    """The numbers among conditions, and those of the parameters that protocols choose."""
     numbers = {name: v for name, v in m.conditions.items() if not isinstance(v, str)}
     return numbers | {name: getattr(m.parameters, name) for name in ("omega_0", "c", "mu", "eta")}

@@ -1,5 +1,4 @@
-"""The figures of the report, as the subjects list them; those of the league and of a designed meter
-are its pages'."""
+"""The figures of the report, as the subjects list them."""
 
 from __future__ import annotations
 
@@ -28,8 +27,7 @@ from model import InputError, Parameters, StorageError
 from model.files import make_directory, write_text
 
 _FRAME = 1e-6, 10.0
-"""Deviations, in parts of the tolerance, that are drawn where they are; what is less or more stands
-at the edge."""
+"""Deviations, in parts of the tolerance, that are drawn; others stand at the edge."""
 _MANY = 100
 """Points beyond which marks are small and hollow."""
 _WIDTH, _BELOW = 7.0, 0.48
@@ -47,8 +45,7 @@ FIGURES: Figures = {
 
 
 def figures_of(claim: str) -> Figures:
-    """The figures shown with a claim; unless one bears its name, also that of the deviations of its
-    numbers."""
+    """The figures shown with a claim; its deviations, too, unless one bears its name."""
     own = {name: each for name, each in FIGURES.items() if claim in each.claims}
     chosen = partial(measured, claim=claim)
     deviations = Drawing(f"Deviations of {claim}", chosen, draw_deviations, (claim,))
@@ -68,8 +65,7 @@ def _has_tolerance(check: Check) -> bool:
 
 
 def draw_deviations(checks: Checks) -> tuple[Figure, str]:
-    """A figure of the deviations of a claim's numbers from theory, a row for each quantity; and its
-    caption."""
+    """A figure of a claim's deviations, a row for each quantity; and its caption."""
     every, checks = checks, tuple(filter(_has_tolerance, checks))
     names = list(dict.fromkeys(c.measurement.quantity for c in checks))
     engines = list(dict.fromkeys(c.measurement.engine for c in checks))
@@ -142,8 +138,7 @@ def draw_deviations(checks: Checks) -> tuple[Figure, str]:
 
 
 def of_set(p: Parameters) -> Selected:
-    """For each figure that theory alone can draw, by name, the function that selects its data for a
-    set."""
+    """For each figure that theory alone can draw, what selects its data for a set."""
     return {name: partial(each.of_set, p) for name, each in FIGURES.items() if each.of_set}
 
 
@@ -244,8 +239,7 @@ def drawn(new: tuple[Path, Drawing, Any]) -> dict[str, str]:
 
 
 def _mark(drawing: Drawing, data: Any) -> str:
-    """A comment at the end of an SVG file with a hash of the program and the data that it was made
-    from."""
+    """A comment for the end of an SVG file: a hash of program and data."""
     made_from = "\n".join(
         [repr(data), drawing.title, matplotlib.__version__, sources("model", "analytic", "compare")]
     )

@@ -21,11 +21,9 @@ from model.errors import suggestion
 P = ParamSpec("P")
 R = TypeVar("R")
 RTOL = 1e-7
-"""Relative tolerance of simulations that predict: what most of them predict is measured to 1e-4 at
-best."""
+"""Relative tolerance of simulations that predict: most is measured to 1e-4 at best."""
 UNKNOWN = (LookupError, InputError, NoOrbitError, SimulationError)
-"""What a prediction raises where theory knows no such state or motion: that is a deviation, not a
-breakdown."""
+"""What a prediction raises without such a state: a deviation, not a breakdown."""
 
 ENOUGH = 2 / 3
 """Part of the numbers of each criterion that must be able to tell."""
@@ -53,14 +51,12 @@ def simulated(
     flow: Flow | None = None,
     rtol: float = RTOL,
 ) -> Trajectory:
-    """The motion from a state x by event-driven simulation, with so many samples after the first;
-    computed once."""
+    """The motion from a state x by event-driven simulation, with so many samples."""
     return theory(analytic.simulate, p, x, t_end, flow, sample_interval=t_end / samples, rtol=rtol)
 
 
 def judge(claims: Iterable[Claim], records: Records) -> list[Verdict]:
-    """The verdicts on claims, in their order; each stands for itself, whatever becomes of the
-    others."""
+    """The verdicts on claims, in their order; each stands for itself."""
     forget()
     return [verdict(claim, records) for claim in claims]
 
@@ -109,8 +105,7 @@ def verdict(claim: Claim, records: Records) -> Verdict:
 def outcome(
     claim: Claim, checks: Sequence[Check], wanted: Counter[int], lost: Sequence[Missing] = ()
 ) -> Outcome:
-    """The outcome of a claim by its checks; `wanted` is how many were to be made for each
-    criterion. See `verdict`."""
+    """The outcome of a claim by its checks, of which so many were wanted: see `verdict`."""
     if not all(check.agrees for check in checks):
         return Outcome.REFUTED
     if undecided_criteria(checks, wanted):
@@ -170,8 +165,7 @@ def check(criterion: Criterion, m: Measurement) -> Check:
 
 
 def select(claims: Iterable[Claim], ids: Sequence[str] | None) -> list[Claim]:
-    """The claims of the given ids, all for None; `InputError` with a suggestion for an unknown
-    id."""
+    """The claims of the given ids, all for None; `InputError` for an unknown id."""
     known = {claim.id: claim for claim in claims}
     for name in ids or ():
         if name not in known:

@@ -17,8 +17,7 @@ from typing import Any
 import pytest
 
 _ROW = "dualball"
-"""The property of a test's report that holds a row of the summary: it comes through from processes
-of pytest-xdist."""
+"""The property of a test's report that holds a row of the summary, with pytest-xdist, too."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -133,8 +132,7 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
 
 @pytest.fixture(scope="session")
 def dualball_theory() -> Callable[..., Any]:
-    """``theory(p, t_end, x0=(0,) * 6)``: the motion by the event-driven simulation, computed once
-    for all tests."""
+    """``theory(p, t_end, x0=(0,) * 6)``: the event-driven motion, computed once."""
     import analytic  # here, because no other run needs it
 
     @functools.cache

@@ -13,14 +13,12 @@ from model import Case, Parameters
 
 
 def solutions(p: Parameters) -> list[StationarySolution]:
-    """The stationary solutions that a ball may settle to: those that attract, and the one that
-    sinks for ever."""
+    """The stationary solutions that a ball may settle to: attractors, and sinking."""
     return theory(analytic.stable_solutions, p, sinking=True)
 
 
 def lasting_cases(p: Parameters) -> set[Case]:
-    """Cases of the solutions that a ball may settle to; SR is none of its own, but NR on an
-    unloaded floor."""
+    """Cases of the solutions that a ball may settle to; SR is NR on an unloaded floor."""
     return {s.case for s in solutions(p)} - {Case.SR}
 
 
@@ -35,8 +33,7 @@ def case_of(m: Measurement) -> Case:
 
 
 def solution_of(m: Measurement) -> StationarySolution:
-    """The solution of the detected case to which a ball may settle; LookupError if theory has
-    none."""
+    """The solution of the detected case that lasts; LookupError if there is none."""
     for state in solutions(m.parameters):
         if state.case is case_of(m):
             return state
@@ -44,8 +41,7 @@ def solution_of(m: Measurement) -> StationarySolution:
 
 
 def thresholds_of(m: Measurement) -> analytic.Thresholds:
-    """The thresholds of a set by theory: independent of the flow at which something was
-    measured."""
+    """The thresholds of a set by theory: independent of the flow of a measurement."""
     return theory(analytic.thresholds, m.parameters.replace(omega_0=1.0))
 
 

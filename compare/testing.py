@@ -33,8 +33,7 @@ FEWEST, SAMPLES = 10, 10_000_000
 UNITS: dict[str, str] = {
     name: columns(Trajectory)[column]["units"] for name, (column, _) in COMPONENTS.items()
 }
-"""Units of what a motion may have, by name: the columns of a trajectory, of its forces each
-component."""
+"""Units of what a motion may have, by name: columns of a trajectory, components of forces."""
 _COLUMNS = {
     name: (unit, [*(["t"] * (name == "time"))]) for name, unit in UNITS.items() if name != "case"
 }
@@ -42,8 +41,7 @@ _COLUMNS = {
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """A motion, whole or in part; raises `InputError` for values that aren't finite or times that
-    don't increase."""
+    """A motion, whole or in part; raises `InputError` for what can't be one."""
 
     name: str
     time: Array
@@ -137,8 +135,7 @@ def read(source: Source, name: str = "") -> Series:
 
 
 def _column(source: str, name: str, values: Any) -> Array:
-    """The values of a quantity; `InputError` for what is no numbers, or says that it is in another
-    unit."""
+    """The values of a quantity; `InputError` for no numbers, or another unit."""
     about = getattr(values, "attrs", {})  # of a data set of HDF5, and of an array of xarray
     for unit in [about[key] for key in ("units", "unit") if key in about][:1]:
         said = unit.decode("utf-8", "replace") if isinstance(unit, bytes) else str(unit)
@@ -153,8 +150,7 @@ def _column(source: str, name: str, values: Any) -> Array:
 
 
 def _hdf5(path: Path) -> Trajectory | dict[str, Array]:
-    """The trajectory in an HDF5 file, or the columns of a file of another program, which names no
-    schema."""
+    """The trajectory in an HDF5 file, or the columns of a file that names no schema."""
     try:
         return storage.load(path)
     except StorageError as error:
@@ -195,8 +191,7 @@ class Difference:
 
 
 def common_times(a: Series, b: Series) -> Array:
-    """Sample times (n,) of the motion with fewer samples while both last; `InputError` for less
-    than `FEWEST`."""
+    """Sample times (n,) of the sparser motion while both last; at least `FEWEST`."""
     begin, end = max(a.time[0], b.time[0]), min(a.time[-1], b.time[-1])
     times: Array = min((t[(begin <= t) & (t <= end)] for t in (a.time, b.time)), key=len)
     if len(times) < FEWEST:
@@ -207,8 +202,7 @@ def common_times(a: Series, b: Series) -> Array:
 
 
 def difference(a: Series, b: Series, quantity: str) -> Difference:
-    """How far a is from b in a quantity at `common_times`, linearly between samples; raises
-    `InputError`."""
+    """How far a is from b in a quantity at `common_times`; raises `InputError`."""
     times, rows, doubts = common_times(a, b), [], []
     for t, values in ((each.time, each[quantity]) for each in (a, b)):
         rows.append(np.interp(times, t, values))

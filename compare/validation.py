@@ -162,8 +162,7 @@ class SoFar:
     waiting: Counter[str]
     """How often a protocol is still to be carried out."""
     broken: dict[str, str] = field(default_factory=dict)
-    """Errors of protocols of the engine on trial: each takes its own claims with it, and no
-    others."""
+    """Errors of protocols of the engine on trial: each takes its own claims with it."""
 
     def take(self, job: Job, found: Records | Exception) -> None:
         """Take in what a protocol has measured, or its error."""
@@ -245,8 +244,7 @@ def judge_stored(
 
 
 def _judged(directory: Path, number: int) -> dict[str, Any]:
-    """In a worker: judge a claim by its number; the verdict's fields, since claims can't be sent
-    between processes."""
+    """In a worker: judge a claim; the verdict's fields, since claims can't be sent."""
     judged = _in_time(CLAIMS[number], stored(directory))
     return {name: value for name, value in vars(judged).items() if name != "claim"}
 
@@ -268,8 +266,7 @@ def stored(directory: Path) -> RecordsByEngine:
 
 
 def evidence(directory: Path, verdicts: Sequence[Verdict], records: RecordsByEngine) -> Evidence:
-    """Collect what figures draw: checks by claim, and each engine's measurements, at half the usual
-    step if there."""
+    """Collect what figures draw: checks by claim, measurements at half the usual step."""
     checks = {
         v.claim.id: (*v.checks, *(c for w in v.engines[1:] for c in w.checks)) for v in verdicts
     }
@@ -287,8 +284,7 @@ def told(name: str, directory: Path) -> tuple[Claim, Verdict | None, Summary]:
 
 
 def stored_evidence(directory: Path) -> Evidence:
-    """As `evidence`, of a stored validation, which is judged again; empty if the directory holds
-    none."""
+    """As `evidence`, of a stored validation, judged again; empty if there is none."""
     if not (directory / results.SUMMARY).exists():
         return Evidence()
     records = stored(directory)

@@ -1,5 +1,4 @@
-"""Physics engines with free bodies, a module each: they build and step the exact cases and the ball
-in its vessel."""
+"""Physics engines with free bodies, a module each: they build and step scenes."""
 
 KNOWN = {
     "dart": "dartpy 6.20.0",
@@ -11,5 +10,4 @@ KNOWN = {
     "rapier": "rapier3d 0.36.1",
     "sapien": "sapien 3.0.3",
 }
-"""Packages and versions with which they are known to work: here, so that it can be said where one
-can't be imported."""
+"""Packages and versions with which they are known to work, also where one can't be imported."""

@@ -42,8 +42,7 @@ def main() -> None:
 
 
 class Scene:
-    """A ball in axes that turn with it, outward, along and up, so that floor and wall are
-    planes."""
+    """A ball in axes that turn with it, outward, along, up: floor and wall are planes."""
 
     def __init__(self, given: dict[str, Any]) -> None:
         self.given, self.R, self.r, self.mass = given, given["R"], given["r"], given["m"]
@@ -90,8 +89,7 @@ class Scene:
         self.simulation.initialize()
 
     def advance(self, force: list[float]) -> Any:
-        """Take a step under a force in world axes, constant over it; position, velocity and spin
-        after it."""
+        """Take a step under a force in world axes; position, velocity and spin after it."""
         self.axes, q = turned(self.azimuth), self.ball.q()
         before, way = self.R + q[0], q[1]
         outward, along, upward = self.axes @ force
@@ -109,8 +107,7 @@ class Scene:
         return position, (rates[:3] @ axes).tolist(), (rates[3:] @ axes).tolist()
 
     def touches(self) -> list[Any]:
-        """Number, force on the ball and gap of each contact that carried something in the last
-        step."""
+        """Number, force on the ball and gap of each contact that bore something last."""
         shown = []
         for number, contact in enumerate(self.contacts):
             impulse = contact.lambda_(1)

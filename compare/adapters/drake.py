@@ -101,8 +101,7 @@ class Drake(Free):
                 self.wall = self.state_slices(walls[surface.name])
 
     def moving_body(self, surface: Surface) -> Any:
-        """The body of a surface that moves: a turntable on its hinge, or one that floats without
-        gravity."""
+        """The body of a surface that moves: a turntable on its hinge, or one that floats."""
         plant, own = self.plant, self.plant.AddModelInstance(surface.name)
         plant.set_gravity_enabled(own, False)
         # the engine's own stiffness is by mass
@@ -130,8 +129,7 @@ class Drake(Free):
         ]
 
     def add(self, of: Any, pose: Any, shape: Any, name: str, friction: float | None = None) -> Any:
-        """Register a shape of the body or of a surface; `friction` is that of the pair, None for
-        the body."""
+        """Register a shape; `friction` is that of the pair of a surface, None for the body."""
         material, mu = engine.ProximityProperties(), self.most
         if friction is not None:  # the harmonic mean of both is the pair's
             mu = mu * friction / (2 * mu - friction) if friction else 0.0
@@ -142,8 +140,7 @@ class Drake(Free):
         return self.plant.RegisterCollisionGeometry(of, pose, shape, name, material)
 
     def plane(self, of: Any, point: Array, normal: Array, name: str, surface: Surface) -> Any:
-        """Register a plane: a half space, or one side of a cube, as a dozen half spaces crash the
-        engine."""
+        """Register a plane: a half space, or a side of a cube: many half spaces crash it."""
         size = (
             0.0 if self.best else SIZE * max((each.radius or 0.0) for each in self.scene.surfaces)
         )

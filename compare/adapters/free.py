@@ -1,5 +1,4 @@
-"""What adapters of engines share: free bodies, the force of each step, a plane that goes along for
-a cylinder."""
+"""What adapters of engines share: free bodies, forces, a plane that goes along for a cylinder."""
 
 from __future__ import annotations
 
@@ -48,8 +47,7 @@ class Library:
         return version(self.name)
 
     def load(self, member: str) -> Free:
-        """A copy of an adapter by its name in the module; `InputError` if the package is missing or
-        broken."""
+        """A copy of an adapter by its name; `InputError` if the package can't be loaded."""
         if self.missing:
             raise InputError(self.missing)
         try:
@@ -93,8 +91,7 @@ class BreakdownError(RuntimeError):
 
 
 class Free(ABC):
-    """A free body in an engine: in the best settings, with a wall that moves along, or as it comes,
-    with facets."""
+    """A free body in an engine: in the best settings, or as it comes, with facets."""
 
     PRECISION = "f64"
     FEATURES: tuple[str, ...] = ()
@@ -104,16 +101,13 @@ class Free(ABC):
     velocities. Semi-implicit steps are leapfrog, of second order, once one says so: in the best
     settings bodies start so far on, and what is read of them is taken back."""
     RESOLUTION = 1e-9
-    """The least slip speed that the engine tells from rolling, m/s: to what its solver goes, or
-    round-off."""
+    """The least slip speed that the engine tells from rolling, m/s."""
 
     TELLS = TURNS = False
-    """Whether the engine tells what contacts carry, friction included, and whether its planes
-    turn."""
+    """Whether the engine tells what contacts carry, and whether its planes turn."""
 
     def __init__(self, name: str, note: str, best: str = "") -> None:
-        """`note`: what is worst, and why; `best` declares settings other than the engine's own;
-        empty for those."""
+        """`note`: what is worst, and why; `best` declares settings that aren't its own."""
         self.NAME, self.NOTE, self.best = name, note, bool(best)
         moved = (
             "one plane that goes with the body for a cylinder; positions half a step ahead of "
@@ -128,8 +122,7 @@ class Free(ABC):
         self.seen: State | None = None
 
     def build(self, scene: Scene, timestep: float) -> None:
-        """Put the scene at its start into the engine; raises `NotImplementedError` for one that it
-        can't have."""
+        """Put the scene into the engine; raises `NotImplementedError` if it can't have it."""
         self.ahead = self.now = self.AHEAD * timestep * self.best
         body, under = scene.body.after(self.ahead), scene.under and scene.under.after(self.ahead)
         self.scene, self.timestep = dataclasses.replace(scene, body=body, under=under), timestep
@@ -174,8 +167,7 @@ class Free(ABC):
         return self.best and surface.radius is not None
 
     def planes(self) -> Iterator[tuple[Surface, str, Array, Array]]:
-        """The planes of the scene, as `Scene.planes`: a cylinder's are many, or the one that moves
-        along."""
+        """The planes of `Scene.planes`: a cylinder's are many, or one that moves along."""
         if any(surface.turning for surface in self.scene.surfaces) and not self.TURNS:
             raise NotImplementedError("its planes don't turn")
         return self.scene.planes(1 if self.best else FACETS)
@@ -197,8 +189,7 @@ class Free(ABC):
         raise NotImplementedError("it takes no forces")
 
     def turn(self, point: Array, normal: Array, velocity: Array) -> None:
-        """Place the plane that stands for the cylinder, and give it a velocity for the next step,
-        m/s."""
+        """Place the plane that stands for the cylinder, with its velocity, m/s."""
         raise NotImplementedError("its planes can't be moved")
 
     def touches(self) -> list[Touch]:

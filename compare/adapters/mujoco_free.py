@@ -1,5 +1,4 @@
-"""MuJoCo with free bodies in a case's own MJCF: as it comes, with settings, or under Coulomb's
-law."""
+"""MuJoCo with free bodies in a case's MJCF: as it comes, with settings, or under Coulomb's law."""
 
 from __future__ import annotations
 
@@ -35,8 +34,7 @@ size of the body is told from what stays where it is."""
 
 
 class Bodies(Free):
-    """MuJoCo as it comes, or with a function that sets options and contacts of a case's scene for a
-    time step."""
+    """MuJoCo as it comes, or with a function that sets options and contacts of a scene."""
 
     TELLS = TURNS = True
     FEATURES: tuple[str, ...] = FEATURES
@@ -50,8 +48,7 @@ class Bodies(Free):
         tune: Callable[[Any, Scene, float], None] | None = None,
         declared: str = "",
     ) -> None:
-        """`tune` is that function; `declared` is for what `best`, a wall that goes along, doesn't
-        declare."""
+        """`tune` is that function; `declared` is for what `best` doesn't declare."""
         super().__init__(name, note, best)
         self.tune, self.DECLARED = tune, declared or self.DECLARED
 
@@ -179,8 +176,7 @@ def studied(spec: Any, scene: Scene, timestep: float) -> None:
 
 
 def rigid(spec: Any, scene: Scene, timestep: float) -> None:
-    """Set an elliptic cone, solved to round-off; dry joints stop within a step; a wall that moves
-    replaces facets."""
+    """Set an elliptic cone, dry joints that stop within a step, a wall that moves."""
     spec.option.cone, spec.option.tolerance = mujoco.mjtCone.mjCONE_ELLIPTIC, 1e-12
     for joint in spec.joints:
         joint.solref_friction = (-1.0, -_SOLIMP / timestep)

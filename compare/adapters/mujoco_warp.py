@@ -1,5 +1,4 @@
-"""MuJoCo on Warp, on a processor in single precision, in scenes of
-`compare.adapters.mujoco_free`."""
+"""MuJoCo on Warp, on a processor in single precision: scenes of `compare.adapters.mujoco_free`."""
 
 from __future__ import annotations
 

@@ -32,8 +32,7 @@ class Newton(Free):
     def __init__(
         self, solver: str, note: str, best: str = "", shortest: float = 1e-3, **options: Any
     ) -> None:
-        """Of two steps the shorter one is given, s: one of 1 ms would take some of them minutes a
-        case."""
+        """Of two steps the shorter one is given, s: 1 ms would take minutes a case."""
         super().__init__(f"newton-{solver.lower()}{'' if best else '-defaults'}", note, best)
         self.solver, self.options = getattr(engine.solvers, f"Solver{solver}"), options
         self.TIMESTEPS = (4e-3, shortest)

@@ -28,8 +28,7 @@ class Rapier(Free):
     FEATURES = ("two bodies", "moving surface", "restitution", "tripod", "disc")
     RESOLUTION = 1e-4
     SMALL = 16
-    """Small steps in one, in the best settings: the engine's own, but where a wall has to be placed
-    before each."""
+    """Small steps in one, in the best settings: the engine's own, unless a wall moves."""
 
     def build(self, scene: Scene, timestep: float) -> None:
         self.small = self.SMALL if self.best and scene.in_cylinder else 1

@@ -66,8 +66,7 @@ class Sapien(Free):
         self.body.set_angular_velocity(body.spin)
 
     def add(self, component: Any, pose: Any, friction: float, size: tuple[float, ...] = ()) -> Any:
-        """Attach a shape with a friction: a plane, sphere or box, as its size has no, one or three
-        numbers."""
+        """Attach a plane, sphere or box with a friction: its size has 0, 1 or 3 numbers."""
         kinds = {
             0: physx.PhysxCollisionShapePlane,
             1: physx.PhysxCollisionShapeSphere,

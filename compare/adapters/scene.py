@@ -38,8 +38,7 @@ class Surface:
     radius: float | None = None
     """Of the cylinder, m; None for a plane."""
     turning: float = 0.0
-    """Angular velocity of its material about the vertical through `point`, rad/s; a turntable has
-    one."""
+    """Of its material about the vertical through `point`, rad/s; a turntable has one."""
     velocity: Vector = (0.0, 0.0, 0.0)
     """Of its material along itself, m/s; a belt has one."""
     restitution: float = 0.0
@@ -61,8 +60,7 @@ class Body:
     spin: Vector
     """Angular velocity, rad/s."""
     shape: str
-    """``sphere``, ``box``, ``disc``, round its own z axis, or ``tripod``: three spheres that are
-    joined, and stand."""
+    """``sphere``, ``box``, ``disc``, round its z axis, or ``tripod``: three spheres."""
     size: tuple[float, ...]
     """Radius; or the three half edges; or radius and half the thickness; or of a tripod's feet the
     radius, how far from the axis, and how far below the centre they are, the first along x; m."""
@@ -124,8 +122,7 @@ class Scene:
     """Coulomb's coefficient of the two bodies."""
 
     def force(self, t: float, position: Any, velocity: Any) -> Vector:
-        """All that acts at the body's centre at a time in s but gravity and contacts, N; engines
-        set it every step."""
+        """All that acts at the body's centre at a time but gravity and contacts, N."""
         (x, y, *_), (v_x, v_y, v_z), mc = position, velocity, self.body.mass * self.drag
         relative = (v_x + self.flow * y, v_y - self.flow * x, v_z)
         pulls = zip(self.pull, self.growth, relative, position, strict=True)
@@ -144,8 +141,7 @@ class Scene:
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """Features that not every engine has, by name: one that has them declares so in
-        `FEATURES`."""
+        """Features that not every engine has; one that does names them in `FEATURES`."""
         asked = {
             "two bodies": self.under,
             "moving surface": any(any(surface.velocity) for surface in self.surfaces),
@@ -176,8 +172,7 @@ class Scene:
                     )
 
     def mjcf(self, timestep: float = 1e-3) -> str:
-        """The scene for MuJoCo with all of its contact parameters as they come; it lacks `force`
-        and restitution."""
+        """The scene for MuJoCo, as it comes; it lacks `force` and restitution."""
         parts: list[str] = []
         qpos: list[float] = []
         qvel: list[float] = []
@@ -253,8 +248,7 @@ def _text(numbers: Any) -> str:
 
 
 def in_body_axes(orientation: tuple[float, ...], vectors: Any) -> Array:
-    """Vectors (3,) or (n, 3) in world axes, in the axes of a body with an orientation (a unit
-    quaternion)."""
+    """Vectors (3,) or (n, 3) in world axes, in the axes of a body (a unit quaternion)."""
     w, *axis = orientation
     return rotated(np.array([w, *(-a for a in axis)]), np.array(vectors))
 

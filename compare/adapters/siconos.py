@@ -137,8 +137,7 @@ class Siconos(Free):
         self._state, self._force = (body.position, body.velocity, body.spin), (0.0, 0.0, 0.0)
 
     def _ask(self, what: Any) -> Any:
-        """Send a line to the process and return its answer; raises `BreakdownError` if there is
-        none."""
+        """Send a line to the process and return its answer; raises `BreakdownError`."""
         assert self._process
         sent, answers = self._process.stdin, self._process.stdout
         assert sent

@@ -51,8 +51,7 @@ class Settings:
 
 
 def scene_fields(p: Parameters, x: State) -> dict[str, Any]:
-    """Fields of the `Scene` of a ball in the study's vessel: the ball at azimuth zero, floor and
-    wall, gravity."""
+    """Fields of the `Scene` of a ball in the study's vessel, at azimuth zero."""
     place, velocity, spin = (part.tolist() for part in to_world(x, 0.0, p))
     body = Body((*place,), (*velocity,), (*spin,), "sphere", (p.r,), p.m, (p.j * p.m * p.r**2,) * 3)
     return {
@@ -146,14 +145,12 @@ def simulate(
 
 
 class _Steps:
-    """The steps of a run: states and contact forces are noted, then turned into samples and cases
-    in blocks."""
+    """The steps of a run: noted, then turned into samples and cases in blocks."""
 
     def __init__(
         self, engine: Free, timestep: float, p: Parameters, every: int, along: float
     ) -> None:
-        """One of `every` steps is a sample; `along` is how fast the plane that stands for the wall
-        slips, m s-1."""
+        """One of `every` steps is a sample; `along`: how fast the wall's plane slips, m s-1."""
         self.engine, self.timestep, self.p, self.every, self.done = engine, timestep, p, every, 0
         self.band = band = _ROLLS * (engine.RESOLUTION + along)
         self.classifier = Classifier(

@@ -1,5 +1,4 @@
-"""What to change in a settled model: the one option that helps its contacts, and the law that holds
-where none does."""
+"""What to change in a settled model: the option that helps, and the law where none does."""
 
 from __future__ import annotations
 
@@ -69,8 +68,7 @@ class Change:
 
 
 def remedy_code(model: Any) -> str:
-    """Lines of Python that hold the contacts of a `model` which no option holds, and step its
-    `data`."""
+    """Lines of Python that hold contacts which no option holds, and step `data`."""
     lines = []
     if model.opt.integrator == mujoco.mjtIntegrator.mjINT_DISCRETE:
         lines.append("model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST")
@@ -95,8 +93,7 @@ def remedied(model: Any, data: Any) -> tuple[Any, Any, Callable[[Any, Any, int],
 
 
 def apply(model: Any, option: str, value: Sequence[float]) -> None:
-    """Set one option of a model; `solref` and `solimp` only of geoms and pairs that are softer than
-    the value."""
+    """Set one option of a model; softness only of what is softer than the value."""
     if option in ("impratio", "cone", "timestep"):
         setattr(model.opt, option, value[0])
     for own in (
@@ -128,8 +125,7 @@ class AtRest:
 
     @np.errstate(over="ignore")
     def harm(self, c: Contacts) -> dict[str, Array]:
-        """How bad each contact is, (n,), by each of `FAULTS`: its value divided by the largest that
-        passes for good."""
+        """How bad each contact is, (n,), by each of `FAULTS`: 1 passes for good."""
         law = c.law()
         speed = np.nan_to_num(np.fmax(law.creep, law.turning * self.radius))
         pair = np.unique(c.geoms, axis=0, return_inverse=True)[1].ravel()

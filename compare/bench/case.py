@@ -1,5 +1,4 @@
-"""An exact contact case as data: a scene whose motion is known to 1e-10, and how errors are
-counted."""
+"""An exact contact case as data: a scene whose motion is known to 1e-10, and its error."""
 
 from __future__ import annotations
 
@@ -18,8 +17,7 @@ from model.arrays import Array
 from model.files import reading_json
 
 VERSION = 3
-"""Of the set of cases and their files; a change of any number is another version. Each has all of
-those before."""
+"""Of the set of cases and their files; a change of any number is another version."""
 TOLERANCE = 1e-2
 """Error, in units of the case's scales, up to which an engine passes at the shortest step. A method
 of first order is wrong by about a step divided by the time that the motion takes to change, 1 ms by
@@ -35,8 +33,7 @@ class ContactCase(Scene):
     times: Array = field(repr=False)
     """Of the samples, (n,), s."""
     exact: Array = field(repr=False)
-    """(n, 9): position, velocity and spin of the body at those times; (n, 18) with those of
-    `under`."""
+    """(n, 9): position, velocity and spin at those times; (n, 18) with those of `under`."""
     contacts: tuple[str, ...] = field(repr=False)
     """For each sample a letter a surface: R sticks or rolls, S slips, N does not touch, T stands on
     an edge of a body that turns; then one for what is `between` two bodies, or for a joint."""
@@ -45,8 +42,7 @@ class ContactCase(Scene):
     source: str
     """Where `exact` is from."""
     scales: tuple[float, float, float]
-    """By what errors of position (m), velocity (m/s) and spin (rad/s) are divided; infinite: not
-    compared."""
+    """Of position (m), velocity (m/s) and spin (rad/s); infinite: not compared."""
     wrong: Mapping[str, Array] = field(default_factory=dict, repr=False)
     """Answers that the case must notice: what is wrong, and `exact` as it would then be."""
     motion: Any = field(default=None, repr=False)
@@ -54,8 +50,7 @@ class ContactCase(Scene):
 
     @property
     def kind(self) -> str:
-        """Landing if a contact closes, else sticking if the body rests, sliding if it slips, or
-        rolling."""
+        """Landing if a contact closes, else sticking, sliding or rolling."""
         alike = zip(*self.contacts, strict=True)
         if (
             "restitution" in self.needs
@@ -81,8 +76,7 @@ class ContactCase(Scene):
         return np.asarray(np.einsum("ijn,nkj->nki", turn, parts))
 
     def error(self, states: Array) -> float:
-        """The largest error of states (n, 9 or 18): the length of a difference of vectors divided
-        by its scale."""
+        """The largest error of states (n, 9 or 18): of a vector, divided by its scale."""
         off = np.linalg.norm(self.compared(states) - self.compared(self.exact), axis=2)
         off /= np.tile(self.scales, len(self.bodies))
         return float(off.max())
@@ -133,8 +127,7 @@ class ContactCase(Scene):
         return np.concatenate(gaps).T, np.concatenate(slips).T
 
     def in_contact(self, letters: str) -> Array:
-        """Where contacts of the exact motion are in one of these states, letters such as R or S;
-        (n, surfaces)."""
+        """Where contacts of the exact motion are in one of these states; (n, surfaces)."""
         return np.array([[letter in letters for letter in sample] for sample in self.contacts])
 
     def to_mapping(self) -> dict[str, Any]:

@@ -21,15 +21,13 @@ from model.arrays import Array
 
 G, J = 9.81, 0.4
 RADIUS, BLOCK, MU = 0.1, (0.1, 0.1, 0.05), 0.5
-"""Radius of the spheres and half edges of the blocks, m; all weigh 1 kg; friction of most
-surfaces."""
+"""Radius of spheres and half edges of blocks, m; they weigh 1 kg; friction of most surfaces."""
 CLOSED_FORMS: list[Callable[[], ContactCase]] = []
 """Functions that make these cases, in the order in which they are listed."""
 CLOSED = 1e-14
 """Round-off of a closed form, in units of the scales."""
 SPEED_ALONE = (math.inf, 0.01, math.inf)
-"""Scales of a body that must not move: a creep of 0.1 mm/s passes, and how far it sinks into its
-floor is left out."""
+"""Of a body that must not move: a creep of 0.1 mm/s passes; how far it sinks in is left out."""
 UP, WAY = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
 """The vertical, and the way of what goes along a level floor."""
 _Motion = tuple[Array, ...]
@@ -120,16 +118,14 @@ def slope(angle: float) -> tuple[Array, Vector]:
 
 
 def along(way: Array, s: Any, v: Any, spin: Any, start: Any) -> _Motion:
-    """Motion along a straight way: distance s and speed v along it, and a spin about the horizontal
-    axis across it."""
+    """Distance s, speed v along a straight way, and a spin about the horizontal across it."""
     across = np.array([-way[1], way[0], 0.0]) / math.hypot(way[0], way[1])
     return start + np.outer(s, way), np.outer(v, way), np.outer(spin, across)
 
 
 # fmt: off
 def _slides_down(t: Array, angle: float, mu: float = MU, v: float = 0.0) -> _Motion:
-    """A block on a slope with a speed v at first; where friction is the stronger it stops and
-    doesn't start again."""
+    """A block on a slope with a speed v at first; where friction is stronger it stops."""
     way, normal = slope(angle)
     a = G * (math.sin(angle) - mu * math.cos(angle))
     if a < 0:
@@ -174,8 +170,7 @@ _on_slope(
     source="Coulomb's law: m x'' = 10 t - mu m g from when that is positive",
     growth=(10.0, 0.0, 0.0))
 def _pulled_ever_harder(t: Array, mu: float = MU, grip: float = 1.0) -> _Motion:
-    """A block pulled by a force that grows by 10 N each second: it slides once that is more than
-    friction can hold."""
+    """A block pulled by a force that grows by 10 N each second until it slides."""
     late = np.maximum(t - grip * mu * G / 10.0, 0.0)
     a0 = (grip - 1) * mu * G
     return along(WAY, a0 * late**2 / 2 + 10.0 * late**3 / 6, a0 * late + 5.0 * late**2, 0 * t,
@@ -211,8 +206,7 @@ def _pressed_to_wall(t: Array, mu: float = MU) -> _Motion:
     until=1.0, scales=(1.0, 1.0, 10.0), contacts=("S", 4.0 / (7 * 0.2 * G), "R"),
     source="Newton and Euler with constant friction mu m g; rolling from t = 2 v/(7 mu g)")
 def _slides_then_rolls(t: Array, mu: float = 0.2, j: float = J) -> _Motion:
-    """A sphere pushed off at 2 m/s without spin: slides until v/r = spin, at 2/(mu g (1 + 1/j)),
-    then rolls."""
+    """A sphere pushed off at 2 m/s without spin: slides until v/r = spin, then rolls."""
     slid = np.minimum(t, 2.0 / (mu * G * (1 + 1 / j)))
     v, s = 2.0 - mu * G * slid, 2.0 * slid - mu * G * slid**2 / 2
     return along(WAY, s + v * (t - slid), v, mu * G * slid / (j * RADIUS), RADIUS * UP)
@@ -267,8 +261,7 @@ _TURNING = 3.0
     until=4.0, scales=(0.5, 0.5, 15.0), contacts=("R",),
     source="Weltner, Am. J. Phys. 47 (1979): v' = 2/7 turning z x v for a uniform ball")
 def _circles_on_turntable(t: Array, j: float = J) -> _Motion:
-    """A sphere on a turntable, x'' = k turning z x x' with k = j/(1 + j), that circles about the
-    table's axis."""
+    """A sphere on a turntable, x'' = k turning z x x' with k = j/(1 + j): it circles."""
     k = _TURNING * j / (1 + j)
     cos, sin, none = np.cos(k * t), np.sin(k * t), 0 * t
     place = 0.5 * np.stack([cos, sin, none], axis=1)
@@ -293,8 +286,7 @@ _CYLINDER = Parameters(m=1.0, r=RADIUS, R=_ORBIT, j=J, mu=1.0, eta=1.0, g=G, c=0
     source="Newton and Euler in the turning frame: the spin along the radius changes with height",
     motion=(_CYLINDER, State(y=10.0, omega_c=_TURNS, slip_x=-_TURNS * _ORBIT / RADIUS)))
 def _rolls_in_cylinder(t: Array, j: float = J) -> _Motion:
-    """A sphere rolling round in a cylinder: z'' = -g/(1 + j) - k^2 z with k = turns sqrt(j/(1 +
-    j))."""
+    """A sphere rolling in a cylinder: z'' = -g/(1 + j) - k^2 z, k^2 = turns^2 j/(1 + j)."""
     k = _TURNS * math.sqrt(j / (1 + j))
     deep = G / (j * _TURNS**2)
     z, fall = -deep * (1 - np.cos(k * t)), -deep * k * np.sin(k * t)

@@ -35,8 +35,7 @@ SOLREF = (0.02, 1.0)
 
 @dataclass(frozen=True, kw_only=True)
 class Contacts:
-    """The n contacts of a settled model: its options and their parameters, which advice may change,
-    and their loads."""
+    """The n contacts of a settled model: options, their parameters, and their loads."""
 
     timestep: float
     impratio: float
@@ -98,14 +97,12 @@ class Contacts:
 
     @property
     def parts(self) -> bool:
-        """Whether any joint can move a body along a contact normal, so that the contacts may
-        part."""
+        """Whether any joint can move a body along a contact normal, so that they may part."""
         return bool((abs(self.rows[:, 0]) > 1e-9 * abs(self.rows).max(initial=1e-300)).any())
 
     @property
     def softness(self) -> Array:
-        """R d/(1 - d): the inverse mass that scales the softness of normal rows, or of the edges of
-        a pyramid, 1/kg."""
+        """R d/(1 - d): the inverse mass that scales the softness of rows or edges, 1/kg."""
         mu2 = self.friction[:, 0] ** 2
         edges = (
             np.where(self.dim > 1, 2 * mu2 * (1 + mu2) / self.impratio, 1) if self.pyramidal else 1
@@ -115,8 +112,7 @@ class Contacts:
 
     @np.errstate(all="ignore")  # what is not chosen divides by zero
     def reference(self, solref: Array) -> tuple[Array, Array]:
-        """Stiffness for an impedance of one, s-2, and damping, s-1, of rows, after what the engine
-        replaces."""
+        """Stiffness for an impedance of one, s-2, and damping, s-1, of rows."""
         high = np.clip(self.solimp[:, 1], mujoco.mjMINIMP, mujoco.mjMAXIMP)
         time, ratio = np.where(((solref > 0).sum(1) == 1)[:, None], SOLREF, solref).T
         if self.refsafe and self.discrete:
@@ -143,8 +139,7 @@ class Contacts:
         return np.where(self._frictional, np.abs(self.force[:, 1:]) / self.friction, 0)
 
     def _rows(self, depth: Array) -> tuple[Array, Array, Array]:
-        """Softness of a row, its stiffness, and the damping of friction as a steady state sees
-        it."""
+        """Softness of a row, its stiffness, and the damping of friction in steady motion."""
         (spring, b, b_f), h = self._springs, self.timestep
         low, high, middle = np.clip(self.solimp[:, [0, 1, 3]], mujoco.mjMINIMP, mujoco.mjMAXIMP).T
         width, power = np.maximum(self.solimp[:, 2], 1e-15), np.maximum(self.solimp[:, 4], 1)
@@ -162,8 +157,7 @@ class Contacts:
         )
 
     def _depth(self, slides: Array) -> Array:
-        """Depth below the margin at which contacts bear their loads, by bisection, m; `slides` says
-        which slip."""
+        """Depth below the margin at which contacts bear their loads, by bisection, m."""
         load = self.force[:, 0]
         low, kept = np.zeros(len(load)), self.friction[:, 0] ** 2 / self.impratio * load
         softness, k, _ = self._rows(low)
@@ -266,8 +260,7 @@ class Contacts:
         return dataclasses.replace(self, **chosen)
 
     def matrices(self) -> tuple[Array, Array, Array]:
-        """Mass, damping and stiffness (n, n) of small motions about the settled state, m a + d v +
-        k x = 0."""
+        """Mass, damping and stiffness (n, n) of small motions: m a + d v + k x = 0."""
         law, flat = self.law(), self.rows.reshape(6 * len(self.dim), self.rows.shape[2])
         weight = law.weight * (np.arange(6) < self.dim[:, None])
 
@@ -278,8 +271,7 @@ class Contacts:
         return np.eye(len(mass)) + mass, damping, stiffness
 
     def stable(self, timestep: float) -> bool:
-        """Whether small motions die out at a time step: the first that doesn't changes sign in
-        every step."""
+        """Whether small motions die out: the first that doesn't changes sign every step."""
         if self.discrete:
             return True
         mass, damping, stiffness = dataclasses.replace(self, timestep=timestep).matrices()
@@ -303,8 +295,7 @@ class Contacts:
 
 @dataclass(frozen=True)
 class Law:
-    """What n contacts do under their loads, nan where one slides or lacks that friction; and their
-    small motions."""
+    """What n contacts do under their loads, nan where one slides or lacks that friction."""
 
     depth: Array
     creep: Array
@@ -370,8 +361,7 @@ def contacts(model: Any, data: Any) -> tuple[Contacts, Array]:
 
 
 def parameters(model: Any, data: Any, number: Array) -> dict[str, Any]:
-    """What options of a model decide for the contacts of these numbers, by the names in
-    `Contacts`."""
+    """What options of a model decide for these contacts, by the names in `Contacts`."""
     option = model.opt
     return {
         "timestep": option.timestep,
@@ -388,8 +378,7 @@ def parameters(model: Any, data: Any, number: Array) -> dict[str, Any]:
 
 
 def replacements(model: Any, c: Contacts, names: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Parameters of one pair's contacts in whose place the engine takes others: the kind, and a
-    sentence on it."""
+    """Parameters of a pair in whose place the engine takes others: the kind, and how."""
     asked, imp, limits = c.solref[0], c.solimp[0], (mujoco.mjMINIMP, mujoco.mjMAXIMP)
     if (asked > 0).sum() == 1:
         yield (

@@ -32,8 +32,7 @@ README = Path(__file__).with_name("templates") / "cases.md"
 SHARP = 1e-13
 """Relative tolerance of the event-driven simulation."""
 BOUND = 1e-10
-"""Of what it then is wrong by: a hundred times what it differs by from itself at ten times the
-tolerance."""
+"""Of what it then is wrong by: a hundred times what ten times the tolerance changes."""
 
 
 @cache
@@ -46,14 +45,12 @@ def cases() -> tuple[ContactCase, ...]:
 
 
 def listing() -> list[list[str]]:
-    """A row for each case: name, number of contacts, kind, what happens; templates/cases.json has
-    them, too."""
+    """A row for each case: name, contacts, kind, what happens; as templates/cases.json."""
     return [[case.name, str(len(case.contacts[0])), case.kind, case.about] for case in cases()]
 
 
 def write(directory: Path) -> None:
-    """Write JSON and MJCF of each case, one HDF5 file of all, and the scoring rule; raises
-    `StorageError`."""
+    """Write each case, one HDF5 file of all, and the scoring rule; `StorageError`."""
     make_directory(directory)
     check_ours(directory / "README.md", beside=directory / "cases.h5")
     said = {"version": VERSION, "tolerance": TOLERANCE, "dualball": current_versions()["dualball"]}
@@ -165,8 +162,7 @@ def _in_vessel(
     until: float,
     wrong: Mapping[str, Mapping[str, float]],
 ) -> ContactCase:
-    """A case of the ball between floor and wall, as in `VESSEL`, by event-driven simulation,
-    sampled 25 times."""
+    """A case of the ball between floor and wall, as in `VESSEL`, sampled 25 times."""
 
     def run(rtol: float, restitution: float = 0.0, **factors: float) -> tuple[Array, Trajectory]:
         """States (n, 9) of a ball with parameters wrong by factors, and its motion."""

@@ -38,11 +38,9 @@ from model import InputError
 from model.errors import few
 
 CREEP, DEPTH = 1e-5, 0.01
-"""What passes for good where nobody says: creep in m/s; depth divided by the radius of the smaller
-body."""
+"""What passes for good unless said: creep in m/s; depth, in radii of the smaller body."""
 SECOND, CHECKED = 1.0, 3.0
-"""What still moves is measured for so long, s; and a changed model must settle within so many to be
-advised."""
+"""How long what moves is measured, s; and within how many a changed model must settle."""
 SHOWN = 12
 """The worst pairs, which are shown."""
 
@@ -102,8 +100,7 @@ class Forecast:
     """Contacts of flexible bodies, which are left out."""
     change: advice.Change | None
     remedy: str
-    """Lines of Python that hold what still creeps harmfully after the change, or without one;
-    empty: nothing does."""
+    """Lines of Python that hold what still creeps harmfully; empty: nothing does."""
 
     @property
     def unsettled(self) -> str:
@@ -133,8 +130,7 @@ def forecast(
     worst = found.pairs[0]
 
     def calm(other: Any) -> bool:
-        """Whether a changed model settles as well: contacts may chatter that are stable for small
-        motions."""
+        """Whether a changed model settles as well: contacts may chatter."""
         try:
             found = settle(other, copy.copy(scene.data), CHECKED, control)
             return len(found.moving) <= len(settled.moving)
@@ -213,8 +209,7 @@ def _measured(
     creep: float = CREEP,
     depth: float | None = None,
 ) -> advice.AtRest:
-    """The contacts of a settled model, and what was measured of them; `data` is left at the end of
-    that."""
+    """The contacts of a settled model and what was measured; `data` is at its end."""
     moving = settled.moving
     if moving:
         step_to_most_contacts(model, data, step)

@@ -43,8 +43,7 @@ def _cures(f: Forecast) -> Iterator[str]:
 
 
 def sentences(f: Forecast) -> Iterator[str]:
-    """A forecast in sentences: what to do, what was found when it was tried, and what else one
-    should know."""
+    """A forecast in sentences: what to do, what was found, what else one should know."""
     yield from _cures(f)
     short = {p.name: f"{p.name} by {100 * p.short:.0f} %" for p in f.pairs if p.short > SLIGHT}
     sliding = [p.name for p in f.pairs if p.slides and p.name not in short]
@@ -115,8 +114,7 @@ def sentences(f: Forecast) -> Iterator[str]:
 
 
 def _number(value: float, factor: float = 1, endless: str = "any") -> str:
-    """A number times a factor as text: three digits, 0 for what is next to nothing, `endless` for
-    infinity."""
+    """A number times a factor: three digits, 0 for next to nothing, `endless` for inf."""
     value *= factor
     if not math.isfinite(value):
         return endless if math.isinf(value) else "–"
@@ -174,8 +172,7 @@ def _without_empty_columns(rows: list[list[str]]) -> list[list[str]]:
 
 
 def snippets(f: Forecast, file: str) -> list[tuple[str, str]]:
-    """What makes a model's file better: what it is, and text to paste into the MJCF, or a program
-    of Python."""
+    """What makes a model's file better: what it is, and text to paste."""
     mjcf = [("MJCF, within <mujoco>", f.change.mjcf)] if f.change else []
     program = f"""\
 import mujoco

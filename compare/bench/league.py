@@ -1,5 +1,4 @@
-"""The league: every engine that is installed on every exact case, as it comes and in the best
-settings known here."""
+"""The league: installed engines on exact cases, as they come and in the best settings known."""
 
 from __future__ import annotations
 
@@ -64,8 +63,7 @@ ENTRY_COLOURS = (
 def measure(
     engines: Mapping[str, Any], steps: Sequence[float] | None, workers: int, show: Show
 ) -> dict[str, list[Result]]:
-    """Results by engine, one for each case; engines that can't be used have results that say
-    why."""
+    """Results by engine, one for each case; engines that can't be used say why."""
     asked, done = cases(), 0
     total, over = len(engines) * len(asked), threading.Event()
 
@@ -88,8 +86,7 @@ def measure(
 
 
 def summary(league: Mapping[str, Sequence[Result]]) -> Rows:
-    """A row for each engine that was tried: how many cases it passes, the median error of each
-    kind, order and cost."""
+    """A row for each engine tried: cases passed, median error by kind, order, cost."""
     kinds = {case.name: case.kind for case in cases()}
     table = [["engine", "precision", "passed", *KINDS, "order", "cost"]]
     for name, results in ranked(league).items():
@@ -146,8 +143,7 @@ def caption(league: Mapping[str, Sequence[Result]]) -> str:
 
 
 def ranked(league: Mapping[str, Sequence[Result]]) -> dict[str, Sequence[Result]]:
-    """Engines that were tried in some case; those that pass the largest share first, as they come
-    behind all others."""
+    """Engines that were tried; the best first, as they come behind all others."""
     tried = {
         name: [result.passed for result in results if not result.skipped]
         for name, results in league.items()
@@ -158,8 +154,7 @@ def ranked(league: Mapping[str, Sequence[Result]]) -> dict[str, Sequence[Result]
 
 
 def cell(result: Result) -> str:
-    """The cell of a result: its error, or in a word why there is none; marked where it is too much
-    to pass."""
+    """The cell of a result: its error, or why there is none; marked if too much."""
     if result.skipped:
         return "–"
     floor = FLOORS[result.engine.precision]
@@ -198,8 +193,7 @@ def declarations(league: Mapping[str, Sequence[Result]]) -> Rows:
 
 
 def notes(league: Mapping[str, Sequence[Result]]) -> Iterator[tuple[str, str]]:
-    """Engines and cases that failed or were not tried, and why; one line for each reason of an
-    engine."""
+    """Engines and cases that failed or were not tried, and why; one line a reason."""
     for name, results in league.items():
         reasons: dict[str, list[str]] = {}
         for result in results:
@@ -229,8 +223,7 @@ def _median(values: Iterator[float]) -> float:
 
 
 def draw(league: Mapping[str, Sequence[Result]]) -> Figure:
-    """A figure with a panel for each kind of case: an engine's median error over its median cost,
-    its steps joined."""
+    """A figure of median errors over median costs, a panel for each kind of case."""
     from matplotlib.ticker import NullFormatter  # here, because drawing takes a second to load
 
     from compare.kit import style

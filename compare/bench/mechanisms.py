@@ -49,8 +49,7 @@ def _plate(mass: float, tilt: float, size: tuple[float, float, float]) -> dict[s
 
 # fmt: off
 _FOOT, _OUT, _DOWN, _MOMENT = 0.01, 0.1, 0.04, 0.006
-"""Of the tripod the size, m, as a `Body` has it, and the moment of inertia about its axis, kg
-m2."""
+"""Of the tripod the size, m, as a `Body` has it, and the moment about its axis, kg m2."""
 TRIPOD = {
     "shape": "tripod", "size": (_FOOT, _OUT, _DOWN), "mass": 1.0,
     "inertia": (0.004, 0.004, _MOMENT),
@@ -183,8 +182,7 @@ _INCLINE, _DOWNHILL = math.atan(0.3), 0.8
     contacts=("S", (_DOWNHILL + 1.0) / (G * (0.5 * math.cos(_INCLINE) - math.sin(_INCLINE))), "R"),
     source="Coulomb's law against the slip on the belt, integrated by hand")
 def _rides(t: Array, mu: float = 0.5, belt: float = 1.0) -> _Motion:
-    """A block that slides down a belt is slowed by g (mu cos - sin) until it goes up with the
-    belt."""
+    """A block that slides down a belt is slowed until it goes up with the belt."""
     a = G * (mu * math.cos(_INCLINE) - math.sin(_INCLINE))
     slid = np.minimum(t, (_DOWNHILL + belt) / a)
     s = _DOWNHILL * slid - a * slid**2 / 2 - belt * (t - slid)
@@ -201,8 +199,7 @@ def _rides(t: Array, mu: float = 0.5, belt: float = 1.0) -> _Motion:
     source="m x'' = -k x -+ F: half circles in the phase plane about -+ F/k",
     spring=100.0, joint=(1.0, 0.0, 0.0), dry=4.0)
 def _swings(t: Array, dry: float = 4.0, stiffness: float = 100.0, start: float = 0.3) -> _Motion:
-    """Half swings about -+ dry/stiffness: each ends 2 dry/stiffness nearer, until the spring is too
-    weak."""
+    """Half swings about -+ dry/stiffness: each ends 2 dry/stiffness nearer, then sticks."""
     rate, shift = math.sqrt(stiffness), dry / stiffness
     half = np.floor(t * rate / math.pi)
     last = max(math.ceil((start / shift - 1) / 2), 0) if shift else math.inf

@@ -153,8 +153,7 @@ def _contacts(model: Any, ball: int) -> tuple[list[Pair], list[Pair]]:
 
 
 class PlainOnJoints(Bodies):
-    """The engine `mujoco-plain` for cases that have a `motion`; with the first step the whole of it
-    is simulated."""
+    """The engine `mujoco-plain` for cases with a `motion`, simulated at the first step."""
 
     def build(self, case: Any, timestep: float) -> None:
         self._task: Task | None = None

@@ -66,8 +66,7 @@ def _slides_off(
     mu: float = MU,
     pyramid: bool = False,
 ) -> _Motion:
-    """A block on a level floor with a speed v, or pulled by so many times its weight, at an angle
-    to the x axis."""
+    """A block on a level floor with a speed v, or pulled, at an angle to the x axis."""
     way, place, velocity = _way(degrees), BLOCK[2] * UP, np.zeros(3)
     for along, strength in _ways(way, mu, pyramid):
         share = float(way @ along)

@@ -105,8 +105,7 @@ class Result:
 
     @property
     def order(self) -> float:
-        """The power of the step with which the error falls; nan where it is round-off, or where a
-        run failed."""
+        """The power of the step with which the error falls; nan where there is none."""
         errors, floor = np.array(self.errors), FLOORS.get(self.engine.precision, FLOORS["f64"])
         if len(errors) < 2 or not (errors > floor).all():
             return math.nan
@@ -145,8 +144,7 @@ def run_all(
     steps: Sequence[float] | None = None,
     limit: float = LIMIT,
 ) -> Iterator[Result]:
-    """Run an engine on many cases, one after the other in one process, that is begun anew where it
-    hangs or dies."""
+    """Run an engine on many cases in one process, begun anew where it hangs or dies."""
     with closing(EngineProcess(engine, limit)) as trial:
         for case in cases:
             yield trial.result(case, steps)
@@ -205,8 +203,7 @@ class EngineProcess:
         self._pipe.close()
 
     def result(self, case: ContactCase, steps: Sequence[float] | None = None) -> Result:
-        """The result of the engine on a case, at all steps; shorter ones are not tried where one
-        hangs."""
+        """The result of the engine on a case, at all steps until one hangs."""
         about, found = self.about, Result(case.name, self.about)
         if about.missing:
             return replace(found, skipped=about.missing)
@@ -252,8 +249,7 @@ class EngineProcess:
 
 
 def _load(given: Any) -> tuple[Any, About]:
-    """An engine by name or as it is, and what it says of itself; `InputError` if it can't be had or
-    lacks something."""
+    """An engine, and what it says of itself; `InputError` if it lacks something."""
     engine = given
     if isinstance(given, str):
         module, _, member = given.partition(":")
@@ -289,8 +285,7 @@ def _load(given: Any) -> tuple[Any, About]:
 
 
 def _version(given: Any, engine: Any) -> str:
-    """The version of an engine's package, and that with which it is known to work if that is
-    another, as text."""
+    """The version of an engine's package, and that with which it is known to work."""
     package, _, known = _package(given, engine).partition(" ")
     here = version(package) if package else ""
     return f"{package} {here}".strip() + (
@@ -299,8 +294,7 @@ def _version(given: Any, engine: Any) -> str:
 
 
 def _package(given: Any, engine: Any) -> str:
-    """The package that an engine comes in, and the version with which it is known to work; or
-    nothing."""
+    """An engine's package, and the version known to work; or nothing."""
     _, ours, own = str(given).rpartition(f"{adapters.__name__}.")
     listed = adapters.KNOWN.get(own.partition(":")[0], "") if ours else ""
     return str(getattr(engine, "KNOWN", listed))
@@ -336,8 +330,7 @@ def serve_engine(handle: int) -> None:
 
 
 def _attempt(engine: Any, case: ContactCase, step: float) -> Any:
-    """States (n, 9) or None, processor time divided by simulated time, and why there are no
-    states."""
+    """States (n, 9) or None, cost per simulated time, and why there are no states."""
     states, spent, done = np.empty_like(case.exact), 0.0, 0
     try:
         engine.build(case, step)

@@ -1,5 +1,4 @@
-"""Any MuJoCo model brought to rest: what still moves, lies or sleeps then, what contacts bear, how
-fast they slip."""
+"""Any MuJoCo model at rest: what moves or sleeps, what contacts bear, how fast they slip."""
 
 from __future__ import annotations
 
@@ -21,25 +20,21 @@ from model.errors import few
 from model.parameters import ANY, POSITIVE, Range, check_number, parse_number
 
 Control = Callable[[Any, Any], None]
-"""Sets `data.ctrl`, or any force, of a model and its data before a step; it may be given copies of
-both."""
+"""Sets `data.ctrl`, or any force, of a model and its data, maybe copies, before a step."""
 Advance = Callable[[Any, Any, int], None]
 """Advances the data of a model by a number of steps, as `mujoco.mj_step` does."""
 STEADY, STILL = 2e-3, 1e-8
-"""A speed that changes by less than this share, or by this (m/s), from one window to the next has
-settled."""
+"""A speed that changes by no more than this share, or this (m/s), in a window has settled."""
 MOST_POINTS = 25_000_000
 """Of a heightfield or texture: 5000 by 5000, some 200 MB while it is compiled."""
 NOISE = 1e-6
 """Speeds that are not told apart, m/s."""
 RESTLESS, JOLT, TURNING = 0.3, 1e-3, 0.05
-"""A body moves on if its speed changes by this share, or this (m/s), between windows, or if it
-turns by this, rad."""
+"""A body moves on if its speed changes by this share, or this (m/s), or it turns so, rad."""
 WINDOW, WINDOW_STEPS = 0.1, 50
 """A window is so long, s, and of so many steps."""
 BENT, SUNK = 0.3, 0.1
-"""A robot has collapsed if a driven joint has turned by this, rad, and it sank by this share of its
-size."""
+"""A robot has collapsed if a driven joint turned so, rad, and it sank by this share of its size."""
 BAD = [getattr(mujoco.mjtWarning, f"mjWARN_BADQ{name}") for name in ("POS", "VEL", "ACC")]
 """What the engine warns of when a model diverges."""
 
@@ -271,8 +266,7 @@ def mean_velocities(model: Any, data: Any, step: Advance, time: float = WINDOW) 
 
 
 def step_to_most_contacts(model: Any, data: Any, step: Advance) -> None:
-    """Advance to the moment of a window at which most pairs of geoms bear a load: what rattles
-    comes and goes."""
+    """Advance to the moment of a window at which most pairs of geoms bear a load."""
     most = 0
     for _ in range(WINDOW_STEPS):
         step(model, data, 1)
@@ -284,8 +278,7 @@ def step_to_most_contacts(model: Any, data: Any, step: Advance) -> None:
 
 
 def loads_by_pair(model: Any, data: Any) -> dict[tuple[int, int], Array]:
-    """What each pair of geoms bears, summed over its contacts: load, N, depth, m, number, and
-    friction (3), N."""
+    """What each pair of geoms bears: load, N, depth, m, number, and friction (3), N."""
     found: dict[tuple[int, int], Array] = {}
     force = np.zeros(6)
     for k, (geoms, depth) in enumerate(
@@ -303,8 +296,7 @@ def loads_by_pair(model: Any, data: Any) -> dict[tuple[int, int], Array]:
 def measured_slip(
     model: Any, data: Any, c: Contacts, number: Array, step: Advance, time: float
 ) -> dict[str, Array]:
-    """How deep each contact is, and how fast its two bodies slip past each other and turn, in the
-    mean of a window."""
+    """How deep each contact is, and how fast its bodies slip and turn, in a window's mean."""
     found = data.contact
     depth = -found.dist[number]
     drift = found.surfacevel[number, :2]
@@ -326,8 +318,7 @@ def measured_slip(
 
 
 def radii(model: Any) -> Array:
-    """The radius of each body, m, which is that of its largest geom; infinite where none has a
-    size."""
+    """The radius of each body, m, that of its largest geom; infinite without a size."""
     radius = np.zeros(model.nbody)
     np.maximum.at(radius, model.geom_bodyid, model.geom_rbound)
     return np.where(radius > 0, radius, np.inf)

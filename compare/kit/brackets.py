@@ -18,8 +18,7 @@ Answer = Callable[[Trajectory], bool | None]
 
 @dataclass(frozen=True)
 class Attempt:
-    """How the run of a question is done: `time` times as long, with the time step divided by
-    `divisor`."""
+    """How a question's run is done: `time` times as long, the step divided by `divisor`."""
 
     time: int = 1
     divisor: int = 1
@@ -144,8 +143,7 @@ def narrow(runner: Runner, searches: Sequence[Search], careful: bool = True) -> 
 def _answers(
     runner: Runner, questions: Sequence[Question], failures: dict[Search, str], how: Attempt = USUAL
 ) -> list[Reply]:
-    """Carry out a run for each question: its answer, those without one run anew for longer; errors
-    into `failures`."""
+    """Carry out a run for each question; those without an answer anew for longer."""
     tasks, replies = [search.task(value, bracket, how) for search, value, bracket in questions], []
     for (search, *_), task, run in zip(questions, tasks, runner.each(tasks), strict=True):
         if isinstance(run, str):

@@ -37,19 +37,15 @@ from model.versions import current_versions
 BATCH = 64
 """Most runs that a process takes at once, and stores in one file."""
 HELD = 2**16
-"""Most samples of a batch, some 11 MB, three times that while it is stored; a run with more is
-written as it comes."""
+"""Most samples of a batch, some 11 MB; a run with more is written as it comes."""
 READ = 2**18
-"""Samples of runs read last, or not stored, that are held in memory, some 45 MB: most are looked at
-soon after."""
+"""Samples held in memory, some 45 MB: most runs are looked at soon after."""
 SOON_DONE = 10.0
-"""Processor time of a batch, s, that isn't worth a file where runs are removed as soon as they are
-measured."""
+"""Processor time of a batch, s, that isn't worth a file where most runs are removed."""
 FAILURES = "failures.json"
 Save = Callable[[Mapping[str, Trajectory], Path], None]
 Ended = tuple[str, Path | None, Trajectory | None]
-"""Why a run is not whole, empty if it is; the file of what there is of it, if any; the run, if it
-has no file."""
+"""Why a run isn't whole, or empty; its file, if any; the run, if it has no file."""
 _BROKEN = ".failed.h5"
 _NAME = re.compile(r"(?:(.+)-)?([0-9a-f]{24})(\.failed)?\.h5")
 """Label, ID, and whether it broke down; files of earlier versions have no label."""
@@ -163,8 +159,7 @@ class Campaign:
             self.directory.rmdir()
 
     def part(self, label: str, doing: str) -> Campaign:
-        """A part of the campaign with a label and runs of its own, which another thread may carry
-        out."""
+        """A part of the campaign with a label and runs of its own, for another thread."""
         part = copy.copy(self)
         part.label, part.doing, part._read = label, doing, {}
         part._files = {
@@ -173,8 +168,7 @@ class Campaign:
         return part
 
     def load(self, key: str) -> Trajectory:
-        """The run of a task that was carried out, by its key; raises `StorageError` if it can't be
-        read."""
+        """The run of a task that was carried out, by its key; raises `StorageError`."""
         if key not in self._read:
             runs = storage.load_runs(self._files[key])
             self._keep_in_memory(runs if key in runs else {key: runs[""]})
@@ -250,16 +244,14 @@ class Campaign:
         return failures
 
     def keep(self, keys: Collection[str]) -> None:
-        """Store these runs of the label in a file of their own, ``LABEL.h5``, which `reduce`
-        leaves."""
+        """Store runs of the label in a file of their own, ``LABEL.h5``, for good."""
         file = self.directory / f"{self.label}.h5"
         if keys:
             storage.save_batch({key: self.load(key) for key in sorted(keys)}, file)
             self._files |= dict.fromkeys(keys, file)
 
     def reduce(self) -> None:
-        """Remove all runs of the label but those kept and those that broke down: what was measured
-        is stored."""
+        """Remove all runs of the label but those kept and those that broke down."""
         own = {file for file in self._files.values() if file.name.rpartition("-")[0] == self.label}
         gone = {file for file in own if not file.name.endswith(_BROKEN)}
         for file in gone:
@@ -319,8 +311,7 @@ class Campaign:
 
 
 def run_batch(tasks: Sequence[Task], storing: Storing, limit: float) -> list[Ended]:
-    """Carry out tasks, each within so many s, and store their runs; raises `StorageError` if that
-    can't be done."""
+    """Carry out tasks, each within so many s, and store them; raises `StorageError`."""
     begun, whole, ended = time.process_time(), dict[str, Trajectory](), dict[str, Ended]()
     for task in tasks:
         path = storing.directory / f"{storing.label}-{task.key}.h5"

@@ -133,8 +133,7 @@ def collect(
 
 
 def _columns_of_files(directory: Path, files: Sequence[Path]) -> tuple[Columns, list[str]]:
-    """The columns of all runs of some files, named by their paths in the directory; and errors of
-    unreadable files."""
+    """The columns of all runs of some files, named by paths; and errors of others."""
     parts, problems = [], []
     for file in files:
         try:
@@ -183,8 +182,7 @@ def _rows(path: Path, shown: Path) -> Columns:
 
 
 def save_means(runs: Mapping[str, Trajectory], path: Path) -> None:
-    """Write what runs settled to, by name, without their samples; raises `StorageError` if that
-    can't be done."""
+    """Write what runs settled to, by name, without samples; raises `StorageError`."""
     with WholeFile(path) as whole:
         whole.file.attrs.update(
             schema=MEANS,
@@ -196,8 +194,7 @@ def save_means(runs: Mapping[str, Trajectory], path: Path) -> None:
 
 
 def _means(runs: Mapping[str, Trajectory]) -> Columns:
-    """Parameters, means over the last quarter with uncertainties by drift, last case of runs; nan
-    and -1 if short."""
+    """Parameters, means with drifts, last case of runs; nan and -1 if short."""
     rows = []
     for name, run in runs.items():
         row: dict[str, Any] = {"run": name, "engine": run.header.engine} | dataclasses.asdict(
@@ -259,8 +256,7 @@ def _attributes() -> dict[str, dict[str, Any]]:
 
 
 def varied_parameters(of: Mapping[str, npt.NDArray[Any]]) -> list[str]:
-    """Names of the parameters that have several values in the columns; older files have no law of
-    drag."""
+    """Names of parameters with several values; older files have no law of drag."""
     return [
         f.name
         for f in dataclasses.fields(Parameters)
@@ -352,8 +348,7 @@ def _parameters(of: Columns, k: int) -> Parameters:
 
 
 def described(of: dict[str, npt.NDArray[Any]]) -> dict[str, Any]:
-    """What the columns of a collection hold, as `describe` gives it; `drag` is missing in older
-    ones."""
+    """What the columns of a collection hold, as `describe` gives it."""
     codes, counts = np.unique(of["case"], return_counts=True)
     finite = {
         name: values[np.isfinite(values)] for name, values in of.items() if values.dtype.kind == "f"

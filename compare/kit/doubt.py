@@ -7,8 +7,7 @@ from model import Parameters
 
 
 def model_warning(off: float) -> list[str]:
-    """The warning that the model leaves out too much of a real fluid, if its error `off` exceeds
-    the limit."""
+    """The warning that the model leaves out too much, if its error `off` is too large."""
     if off <= real_fluid.LIMIT:
         return []
     return [

@@ -22,8 +22,7 @@ if TYPE_CHECKING:  # it takes half a second to load, and much that hands it over
 
 @dataclass(frozen=True)
 class Motion:
-    """A trajectory handed to a figure, by a name that stands for its content; it is read only to be
-    drawn."""
+    """A trajectory for a figure, by a name that stands for its content."""
 
     name: str
     engine: str
@@ -33,8 +32,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a validation leaves for figures to show: judged numbers, measurements, run files; all
-    may be none."""
+    """What a validation leaves for figures: judged numbers, measurements, run files."""
 
     checks: Mapping[str, Sequence[Check]] = field(default_factory=dict)
     """By the id of the claim on which they bear."""
@@ -45,8 +43,7 @@ class Evidence:
     """What other engines measured at steps that users take."""
 
     def select(self, quantity: str, *conditions: str) -> Iterator[Measurement]:
-        """Measurements of a quantity, by all engines, among whose conditions are those of these
-        names."""
+        """Measurements of a quantity, by all engines, that have conditions so named."""
         named = set(conditions)
         measured = (*self.records.measurements, *self.others.measurements)
         return (m for m in measured if m.quantity == quantity and named <= m.conditions.keys())
@@ -62,8 +59,7 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Diagram:
-    """What most figures show, by the name of the figure: a parameter set, what was measured with
-    it, and its runs."""
+    """What most figures show: a parameter set, what was measured with it, and its runs."""
 
     figure: str
     p: Parameters
@@ -88,15 +84,13 @@ class Drawing:
 
     title: str
     select: Callable[[Evidence], Any]
-    """All that is drawn, as data whose repr tells it apart; raises `GapError` where results are
-    missing."""
+    """All that is drawn, as data whose repr tells it apart; raises `GapError`."""
     draw: Callable[[Any], tuple[Figure, str]]
     """The figure, and its caption: what is shown, with the parameters."""
     claims: tuple[str, ...] = ()
     """The claims beside which it stands."""
     of_set: Callable[[Parameters], Any] | None = None
-    """The same of another set, by theory alone: `draw` raises `GapError` where the set has no such
-    thing."""
+    """The same of another set, by theory alone; `draw` may raise `GapError`."""
 
 
 _Rows = Callable[[Evidence], Iterable[Measurement]]
@@ -111,8 +105,7 @@ def diagram(
     claims: tuple[str, ...],
     measured: _Rows | None = None,
 ) -> Drawing:
-    """The figure of a `Diagram`: of one set with what was measured with it, or of any other set
-    without."""
+    """The figure of a `Diagram`: of one set with measurements, of others without."""
     chosen = partial(select, name, set, measured)
     return Drawing(title, chosen, partial(_doubted, draw), claims, partial(Diagram, name))
 

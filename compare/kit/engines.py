@@ -36,15 +36,13 @@ class Role(Enum):
     AS_IT_COMES = auto()
     """With its own settings and step, beside the one on trial."""
     FREE_BODY = auto()
-    """The ball as a free body, beside the one on trial, above the quick level: what its joints
-    could be to blame for."""
+    """The ball as a free body, beside the one on trial: are its joints to blame?"""
 
 
 AnySettings = RigidContacts | ContactSettings | analytic.Settings | vessel.Settings
 """Numerical settings of any engine."""
 Simulate = Callable[[Any, Callable[[float], None]], Trajectory]
-"""One whole run of a `compare.kit.tasks.Task`; the function is called with the fraction done, from
-time to time."""
+"""One run of a `compare.kit.tasks.Task`; the function is told the fraction done."""
 Stream = Callable[..., mjsim.Run]
 """Runs that hand out their samples as they come; called as `mjsim.Run`."""
 
@@ -80,8 +78,7 @@ class Engine:
     """What makes it so, as the report's first screen says it."""
     role: Role = Role.ON_TRIAL
     divisors: tuple[int, ...] = (1,)
-    """Time steps in one that a protocol asks for; with several, claims are judged in the limit of
-    no step."""
+    """Time steps in one that a protocol asks for; several: judged in the zero-step limit."""
     relative_tolerance: float = 0.0
     """Share of its scale by which a number may be off, chosen before anything was measured so; 0
     where each measurement has a tolerance of its own."""
@@ -120,8 +117,7 @@ class Engine:
 
 
 STUDY_SLIP = 2.0
-"""Slip speed in m/s for which MuJoCo's own contacts are continuous in studies, under the load of
-gravity, at mu = 1."""
+"""Slip speed, m/s, for which MuJoCo's contacts are continuous in studies, at mu = 1."""
 
 
 @cache
@@ -166,8 +162,7 @@ def _theory(method: str, task: Any, progress: Callable[[float], None]) -> Trajec
 
 
 def _adapted(library: Library, marks: str) -> list[Engine]:
-    """The `Engine` of an adapter in its best settings and, if there is a second mark, that in the
-    engine's own."""
+    """The `Engine` of an adapter in its best settings; with a second mark, as it comes, too."""
     name = library.module.rpartition(".")[2]
     best = Engine(
         name=name,
@@ -274,8 +269,7 @@ ENGINES: dict[str, Engine] = {
 
 
 def engine(name: str) -> Engine:
-    """The engine of a name, or of its alias `analytic`; `InputError` with a suggestion if there is
-    none."""
+    """The engine of a name, or of its alias `analytic`; `InputError` if there is none."""
     name = "event" if name == "analytic" else name
     if name not in ENGINES:
         raise InputError(

@@ -37,8 +37,7 @@ _TEX = {r"\omega": "ω", r"\Omega": "Ω", r"\eta": "η", r"\mu": "μ", r"\rho": 
 _TEX |= {r"\Delta": "Δ", r"\sqrt{R/g}": "√(R/g)", r"^0": "⁰"}
 _textpath: Any = textpath
 _textpath.MathTextParser = functools.cache(MathTextParser)
-"""One for all figures, which remembers formulas: matplotlib makes one for each, and parses its
-labels anew."""
+"""One for all figures, which remembers formulas: else labels are parsed anew."""
 for _prefix, _uri in (("", _SVG), ("xlink", _XLINK)):
     ElementTree.register_namespace(_prefix, _uri[1:-1])
 
@@ -86,8 +85,7 @@ def svg(figure: Figure) -> str:
 
 
 def embedded(pictures: Mapping[str, str]) -> tuple[dict[str, str], str]:
-    """SVG pictures by name as parts of one page, and an SVG of the letters that they share, to
-    stand before them."""
+    """SVG pictures by name for one page, and an SVG of the letters that they share."""
     letters: dict[str, str] = {}
     made = {}
     for k, (name, picture) in enumerate(pictures.items()):
@@ -153,8 +151,7 @@ def _scales(figure: Figure, axes: Axes) -> dict[str, Any]:
 
 
 def _join_marks(group: ElementTree.Element) -> None:
-    """Replace marks that look alike by one path with a mark at each of its points, which is a tenth
-    as long."""
+    """Replace marks that look alike by one path, which is a tenth as long."""
     looks = {
         (mark.tag, mark.get(f"{_XLINK}href"), mark.get("style"), *sorted(mark.keys()))
         for mark in group

@@ -53,8 +53,7 @@ class Protocol:
     needs: tuple[str, ...] = ()
     """Protocols whose measurements it goes out from."""
     drawn: Callable[[Measurement], bool] = lambda m: False
-    """Whether figures draw the runs of a measurement: those are kept, all others dropped once it is
-    stored."""
+    """Whether figures draw the runs of a measurement: all others are dropped."""
 
 
 @dataclass(frozen=True)
@@ -70,8 +69,7 @@ class Job:
 
     @property
     def name(self) -> str:
-        """The name of the protocol, and of the engine and its step where these are not those on
-        trial."""
+        """The name of the protocol, and of an engine and step that aren't those on trial."""
         return self.beside(self.protocol.name) if self.runner.has_own_steps else self.protocol.name
 
     def beside(self, protocol: str) -> str:
@@ -128,8 +126,7 @@ class Job:
 
 
 def with_needed(protocols: Iterable[Protocol], names: Iterable[str]) -> list[Protocol]:
-    """The protocols of these names and all those whose measurements they need, as `PLAN` orders
-    them."""
+    """The protocols of these names and all that they need, as `PLAN` orders them."""
     known = {protocol.name: protocol for protocol in protocols}
     wanted, todo = set[str](), list(names)
     while todo:

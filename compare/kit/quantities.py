@@ -70,14 +70,12 @@ class Quantity:
     unit: str
     """SI, as in the HDF5 files."""
     resolution: float
-    """Largest error of a prediction, divided by the scale of the quantity, that a check may
-    overlook."""
+    """Largest relative error of a prediction that a check may overlook."""
     scale: Scale | None = None
     """Its natural size; None where that is the predicted value."""
 
     def size(self, p: Parameters, value: float = math.nan) -> float:
-        """Natural size of the quantity, by which its errors are divided: that of its `scale`, or of
-        a value."""
+        """Natural size, by which its errors are divided: that of `scale`, or of a value."""
         return abs(value) if self.scale is None else self.scale(p)
 
 

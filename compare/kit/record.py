@@ -119,8 +119,7 @@ def measurement(
 
 
 def if_found(row: Measurement, why: str) -> Measurement | Missing:
-    """The measurement if it has a finite number, however coarse; else a `Missing` with the
-    reason."""
+    """The measurement if it has a finite number, however coarse; else a `Missing`."""
     return row if row.finite else Missing(row.protocol, row.set, why)
 
 
@@ -168,8 +167,7 @@ class Check:
 
     @property
     def share(self) -> float:
-        """Size of the deviation divided by the tolerance; inf without tolerance, or where theory
-        has no such state."""
+        """Deviation divided by tolerance; inf without tolerance, or without such a state."""
         if self.deviation == 0:
             return 0.0
         share = abs(self.deviation / self.tolerance) if self.tolerance else math.inf
@@ -268,15 +266,13 @@ class Records:
         quantity: str | None = None,
         where: Callable[[Measurement], bool] = lambda m: True,
     ) -> Iterator[Measurement]:
-        """The finite measurements of a protocol, of one quantity if it is named, for which `where`
-        holds."""
+        """The finite measurements of a protocol and quantity for which `where` holds."""
         for m in self.measurements:
             if m.protocol == protocol and quantity in (None, m.quantity) and m.finite and where(m):
                 yield m
 
     def threshold(self, set: str, quantity: str) -> Estimate | None:
-        """The least uncertain measured value of a threshold of a set; None if it was not
-        measured."""
+        """The least uncertain measured value of a threshold of a set, or None."""
         measured = self.select("thresholds", quantity, lambda m: m.set == set)
         best = min(measured, key=lambda m: m.uncertainty, default=None)
         return Estimate(best.value, best.uncertainty) if best else None
@@ -287,8 +283,7 @@ Sets = Mapping[str, Parameters]
 Measured = Iterator[Measurement | Missing]
 """What it yields."""
 RecordsByEngine = Mapping[str, Mapping[int, Records]]
-"""What was measured by each engine, by name, the one on trial first; by time steps in one that a
-protocol asks for."""
+"""What each engine measured, the one on trial first; by its time steps in one."""
 _OWN = ("protocol", "quantity", "value", "uncertainty", "unit", "engine", "set")
 _PARAMETERS = tuple(f.name for f in dataclasses.fields(Parameters))
 

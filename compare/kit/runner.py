@@ -1,5 +1,4 @@
-"""What a protocol works with: an engine, a campaign that keeps its runs, and how much is to be
-measured."""
+"""What a protocol works with: an engine, a campaign of runs, and how much is measured."""
 
 from __future__ import annotations
 
@@ -21,8 +20,7 @@ from model import Flow, Parameters, Trajectory
 
 @dataclass(frozen=True)
 class Runner:
-    """Where protocols run what they need: every run is carried out once and read from its file
-    afterwards."""
+    """Where protocols run what they need: once, and then it is read from its file."""
 
     campaign: Campaign
     engine: Engine
@@ -39,8 +37,7 @@ class Runner:
 
     @property
     def has_own_steps(self) -> bool:
-        """Whether the engine is asked beside the one on trial, or in its place, with time steps of
-        its own."""
+        """Whether the engine has time steps of its own, beside the one on trial or alone."""
         return self.engine.divisors != (1,)
 
     def task(
@@ -71,8 +68,7 @@ class Runner:
         )
 
     def groups(self, groups: Sequence[Sequence[Task]]) -> Iterator[list[Trajectory] | str]:
-        """The trajectories of each group, or why one failed: carried out together, not held in
-        memory together."""
+        """The trajectories of each group, or why one failed; held in memory one by one."""
         failures = self.campaign.complete([task for group in groups for task in group])
         failed = {failure.task.key: failure.reason for failure in failures}
         for group in groups:
@@ -87,7 +83,6 @@ class Runner:
 
 
 def coarse_step(p: Parameters) -> float:
-    """A time step in s, a power of two of 1 ms: a twentieth of `time_unit` or so, and no more than
-    1/(4 omega_0)."""
+    """A time step, s: a power of two of 1 ms, about `time_unit`/20, at most 1/(4 omega_0)."""
     finest = math.floor(math.log2(250 / abs(p.omega_0))) if p.omega_0 else math.inf
     return float(1e-3 * 2.0 ** min(round(math.log2(time_unit(p) / 20e-3)), finest))

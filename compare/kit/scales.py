@@ -1,5 +1,4 @@
-"""Natural sizes, by which deviations and uncertainties are divided: functions of a parameter
-set."""
+"""Natural sizes, by which deviations and uncertainties are divided, of a parameter set."""
 
 from __future__ import annotations
 

@@ -24,8 +24,7 @@ from model.arrays import Array
 from model.drag import STOKES
 
 PRESSES = 0.05
-"""Normal force divided by the weight above which friction is looked at: a contact that carries less
-may hover."""
+"""Normal force, in weights, above which friction is looked at: less may hover."""
 SPIN = 1.0
 """Spin slip_y of a ball in a fluid at rest, in units of sqrt(g/R) R/r."""
 SPAN = 40.0
@@ -36,24 +35,21 @@ SHORT = (1 / 64, 1 / 8)
 """Rounds before those where the law isn't Stokes': other drag laws are stronger, so balls settle
 sooner. The drift limit of such a round is reduced in proportion to its length."""
 STEPS_A_SAMPLE = 8
-"""A coarse time step is a twentieth of sqrt(R/g) or so, and the ball goes round in more than
-that."""
+"""A coarse step is about a twentieth of sqrt(R/g), and the ball goes round more slowly."""
 SOLVED = 2e-11
 """Relative accuracy to which contact forces are solved in a step; errors of one sign add up for a
 time 1/c. (Twenty times what it was before settled states of rigid contacts had been seen, which
 creep by as much.)"""
 FORCES = tuple(f"force_{contact}{axis}" for contact in "AB" for axis in "xyz")
 SUMS = ("force_Az", "force_Bz", "force_Ax-By", "force_Ay+By", "force_Bx+By")
-"""What mechanics determine of the forces where both contacts roll: the rest is a family of one
-parameter."""
+"""What mechanics determine of the forces in RR: the rest is a family."""
 ERROR_GROUPS = (
     ("omega_c",),
     ("slip_x", "slip_y", "slip_z", "wall_spin"),
     ("v_y",),
     (*FORCES, *SUMS[2:]),
 )
-"""Quantities whose errors have the same causes, and are taken to be as large as the largest of
-them."""
+"""Quantities whose errors have the same causes, and are taken to be alike."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,8 +76,7 @@ class SettlingCriteria:
     span: float = SPAN
     """Length of a round in units of 1/c."""
     loose: float = 1.0
-    """A settled state may drift and swing up to so many times the limit for values that are
-    compared with theory."""
+    """How many times the limit for comparison with theory a state may drift and swing."""
     sharp: float = math.inf
     """As long as there are rounds, one that exceeds so many times that limit goes on."""
     rounds: Sequence[float] = ()
@@ -231,8 +226,7 @@ def with_changes(
 
 
 def settled_readings(runner: Runner, protocol: str, starts: Sequence[Start]) -> Measured:
-    """Case and omega_c to which the ball settles from each start, uncertain by what half the step
-    changes, too."""
+    """Case and omega_c to which the ball settles from each start, with half the step, too."""
     parts = runner.sampling.settled_divisor
     criteria = SettlingCriteria(sharp=runner.sampling.settled_sharp, divisor=parts)
     states = settle(runner, starts, criteria)
@@ -273,8 +267,7 @@ def rounded_duration(p: Parameters, units: float) -> float:
 
 
 def initial_condition(set: str, p: Parameters, how: str) -> Start:
-    """A start at the flow of p by its name: from rest, with the fluid or half as fast, or so high
-    up on the wall."""
+    """A start at the flow of p: from rest, with the fluid, half as fast, or up the wall."""
     orbit = {"rest": 0.0, "half as fast": p.omega_0 / 2}.get(how, p.omega_0)
     return Start(
         set,
@@ -285,8 +278,7 @@ def initial_condition(set: str, p: Parameters, how: str) -> Start:
 
 
 def forces(A: Array, B: Array) -> dict[str, Array]:
-    """Components of contact forces (3, ...) by name, and the sums of them that the balances
-    determine in every case."""
+    """Components of contact forces (3, ...), and the sums that are always determined."""
     components = dict(zip(("Ax", "Ay", "Az", "Bx", "By", "Bz"), (*A, *B), strict=True))
     return components | {"Ax-By": A[0] - B[1], "Ay+By": A[1] + B[1], "Bx+By": B[0] + B[1]}
 
@@ -297,7 +289,6 @@ def physical_case(case: Case) -> Case:
 
 
 def settled_cases(records: Records, set: str, how: str) -> dict[float, Case]:
-    """In which case a ball of a set settled from one kind of start, by flow in rad s-1, the slowest
-    first."""
+    """The cases to which a ball of a set settled from a start, by flow, slowest first."""
     found = records.select("settled", "case", lambda m: m.set == set and m.text("start") == how)
     return dict(sorted((m.parameters.omega_0, physical_case(Case(int(m.value)))) for m in found))

@@ -21,8 +21,7 @@ from model.arrays import Array
 COVERAGE = 3.0
 """Standard uncertainties in a tolerance."""
 TAPER = 8
-"""Exponent of the sine that the window is: m periods within it leave about (TAPER/2)!^2/(pi
-m^(TAPER+1)) of one."""
+"""Exponent of the window's sine: m periods leave about (TAPER/2)!^2/(pi m^(TAPER+1))."""
 
 
 @dataclass(frozen=True)
@@ -57,8 +56,7 @@ def uniform(half: float) -> float:
 
 
 def estimate(value: float, size: float = 1.0, **causes: float) -> Estimate:
-    """An estimate whose errors have independent causes, each a standard uncertainty divided by
-    `size`."""
+    """An estimate whose errors have independent causes, given in units of `size`."""
     budget = {cause: u * size for cause, u in causes.items()}
     return Estimate(float(value), math.hypot(*causes.values()) * size, budget)
 
@@ -120,8 +118,7 @@ def settled_case(run: Trajectory) -> Case:
 
 
 def peaks(values: Array) -> tuple[npt.NDArray[np.intp], Array]:
-    """Local maxima of samples (n,): their indices, and how much later, in samples, the parabolas
-    have their tops."""
+    """Local maxima of samples (n,): indices, and how much later, in samples, the tops are."""
     k = 1 + np.flatnonzero((values[1:-1] > values[:-2]) & (values[1:-1] >= values[2:]))
     before, at, after = values[k - 1], values[k], values[k + 1]
     return k, (before - after) / (2 * (before - 2 * at + after))
@@ -151,8 +148,7 @@ def hops_on(y: Array, R: float) -> bool:
 
 
 POINTS = 5
-"""Least number of points that `extrapolated_zero`, `initial_slope` and `extrapolated_maximum`
-extrapolate from."""
+"""Least number of points that extrapolations begin with."""
 LEAST_RATIO, LARGEST_RATIO = 0.2, 0.9
 """Range of the ratio of the geometric series by which the changes of an estimate, point by point,
 are continued: two changes may be small by chance, and with a ratio near 1 the sum has no bound."""
@@ -162,8 +158,7 @@ farther away the maximum is one of round-off."""
 
 
 def slope_error(x: Array, degree: int) -> float:
-    """Standard uncertainty of the slope at 0 of the polynomial through points x (n,), if that of
-    each y is 1."""
+    """Standard uncertainty of a fit's slope at 0, at points x (n,), if that of y is 1."""
     return float(np.linalg.norm(np.linalg.pinv(np.vander(x, degree + 1, increasing=True))[1]))
 
 
@@ -220,16 +215,14 @@ def zero_and_slope(x: Array, y: Array, noise: Array) -> tuple[Estimate, Estimate
 
 
 def extrapolated_zero(where: Array, values: Sequence[Estimate]) -> Estimate:
-    """The place at which a quantity is zero, from places (n,) and its values there, the one nearest
-    to zero first."""
+    """The place (n,) at which a quantity is zero; the value nearest to zero comes first."""
     return _extrapolated(
         lambda y, n: float(Polynomial.fit(y[:n] / np.abs(y).max(), where[:n], n - 1)(0.0)), values
     )
 
 
 def initial_slope(where: Array, values: Sequence[Estimate]) -> Estimate:
-    """Derivative of the place with respect to a quantity where that is zero; arguments as for
-    `extrapolated_zero`."""
+    """Derivative of the place by a quantity at its zero; as `extrapolated_zero`."""
     size = max(abs(m.value) for m in values)
     return _extrapolated(
         lambda y, n: float(Polynomial.fit(y[:n] / size, where[:n], n - 1).deriv()(0.0)) / size,
@@ -328,8 +321,7 @@ def exponents(
 def matched(
     values: npt.NDArray[np.complex128], to: npt.NDArray[np.complex128]
 ) -> npt.NDArray[np.complex128]:
-    """Values (d,) reordered so that each stands where the nearest of others (d,) does, one to
-    one."""
+    """Values (d,) reordered so that each stands where the nearest of others (d,) does."""
     from scipy.optimize import linear_sum_assignment  # here, because it takes half a second to load
 
     order = linear_sum_assignment(np.abs(to[:, None] - values[None, :]))[1]

@@ -109,7 +109,6 @@ def percent(share: float) -> str:
 
 
 def share(omega_c: Array, drift: Array, omega_0: Array) -> Array:
-    """Drifts of the orbit's angular velocity relative to that, or to a hundredth of the fluid's
-    where it is less."""
+    """Drifts of omega_c relative to that, or to a hundredth of omega_0 if it is less."""
     scale = np.maximum(np.abs(omega_c), np.abs(omega_0) / 100)
     return np.divide(drift, scale, out=np.zeros_like(scale), where=scale > 0)

@@ -191,8 +191,7 @@ def random_state(case: Case, p: Parameters, rng: np.random.Generator) -> Array:
 
 
 def constrained(case: Case, x: Array, p: Parameters) -> Array:
-    """The state (8,) with what the case holds at zero set to exactly that, of which a contact
-    leaves some 1e-9."""
+    """The state (8,) with what the case holds at zero set to exactly that."""
     held = [name in TRAITS[case].constraints for name in VARIABLES]
     x = np.where(held, 0.0, x)
     return State.of(x)._replace(slip_z=-State.of(x).v_h / p.r).stacked() if case is Case.RN else x

@@ -1,5 +1,4 @@
-"""How every figure looks: a colour for each case, solid for stable, dashed for unstable, a mark for
-each engine."""
+"""How figures look: a colour a case, solid for stable, dashed for unstable, a mark an engine."""
 
 from __future__ import annotations
 
@@ -35,8 +34,7 @@ COLOURS = {
     Case.NS: "#CC79A7",
     Case.NN: "#000000",
 }
-"""Okabe and Ito's colours, told apart by colour-blind readers; names beside the curves tell them
-apart in print."""
+"""Okabe and Ito's colours, told apart by colour-blind readers; names tell them apart in print."""
 HOPPING = "#7B3294"
 """Of a ball that hops for ever, a motion of several cases."""
 FORCE, SLIP, BALL = "#b3261e", "#6a3d9a", "#f5cc6b"
@@ -99,8 +97,7 @@ _COLUMNS = {
 
 
 def symbol(name: str) -> str:
-    """A quantity of `compare.kit.quantities`, or a column of a motion, by its name, in letters of
-    the axes."""
+    """A quantity, or a column of a motion, by its name, in letters of the axes."""
 
     def typeset(match: re.Match[str]) -> str:
         letter, tilde, index, zero = match.groups()
@@ -121,8 +118,7 @@ OMEGA_0, OMEGA_C, OMEGA_X = (
 
 
 def named(p: Parameters, *names: str) -> str:
-    """Dimensionless parameters as text of a caption, all but that of omega_0 if none is named, and
-    the drag law."""
+    """Dimensionless parameters for a caption, by default without omega_0, and the drag law."""
     values = [
         f"{SYMBOLS[name]} = {getattr(p, name):.3g}" for name in names or ("mu", "eta", "j", "kappa")
     ]
@@ -139,8 +135,7 @@ def caption(p: Parameters, *sentences: str, states: Sequence[Measurement] = ()) 
 
 
 def marks(states: Sequence[Measurement]) -> str:
-    """The part of a caption that explains the marks of measured points; empty where there are
-    none."""
+    """The part of a caption that explains the marks of measured points, if any."""
     if not states:
         return ""
     between = any(m.protocol == "edge" for m in states)
@@ -167,8 +162,7 @@ def marks(states: Sequence[Measurement]) -> str:
 
 
 def dimensionless(axes: Axes, p: Parameters, x: str = "", y: str = "") -> None:
-    """Draw second scales, at the top and right if they are named: angular velocities in units of
-    sqrt(g/R)."""
+    """Draw second scales, at the top and right if named, in units of sqrt(g/R)."""
     unit = math.sqrt(p.g / p.R)
     scale: Any = (lambda w: w / unit, lambda W: W * unit)
     if x:
@@ -229,8 +223,7 @@ def beside(
     offset: tuple[float, float] = (0, 0),
     colour: str = "k",
 ) -> Text:
-    """Write a name beside a point or a curve, `offset` in points, with a line to it if it is far
-    off."""
+    """Write a name beside a point or curve, `offset` in points; far off with a line."""
     leader = (
         {"arrowstyle": "-", "lw": 0.7, "color": "0.4", "shrinkB": 1}
         if math.hypot(*offset) > 16
@@ -250,8 +243,7 @@ def beside(
 
 
 def guides(axes: Axes, values: dict[str, float]) -> None:
-    """Draw dotted lines at thresholds by name, rad s-1, named at the foot, one higher where names
-    would overlap."""
+    """Draw dotted lines at thresholds, rad s-1, named at the foot, or one line higher."""
     low, high = axes.get_xlim()
     last, step = -math.inf, 0
     look: dict[str, Any] = {
@@ -273,8 +265,7 @@ def guides(axes: Axes, values: dict[str, float]) -> None:
 
 
 def mark_of(engine: str) -> dict[str, Any]:
-    """Marker of an engine's points as keywords of matplotlib: black, since colours are those of
-    cases."""
+    """Marker of an engine's points: black, since colours are those of cases."""
     given = ENGINES.get(engine)  # theory against theory has none
     return {"marker": given.mark if given else "D", "color": "0.1", "mfc": "white"}
 
@@ -301,8 +292,7 @@ def points(
     way: str = "",
     **look: Any,
 ) -> None:
-    """Draw measured values times `unit`, by engine, with bars of three standard uncertainties; pale
-    where too long."""
+    """Draw measured values times `unit`, by engine, with bars; pale where too long."""
     rows = list(rows)
     for m in rows:
         axes.update_datalim([(x(m), unit * y(m))])
@@ -330,8 +320,7 @@ def points(
 
 
 def legend(of: Axes | Figure, **where: Any) -> None:
-    """Draw a legend that names everything once, if there is anything to name; of a figure outside
-    the panels."""
+    """Draw a legend that names everything once; of a figure outside the panels."""
     once: dict[str, Any] = {}
     for axes in of.axes if isinstance(of, Figure) else [of]:
         handles, labels = axes.get_legend_handles_labels()
@@ -380,8 +369,7 @@ def ground(
 def deviations(
     axes: Axes, rows: Iterable[Measurement], predicted: Callable[[Measurement], float]
 ) -> None:
-    """Draw relative deviations of measured values from predicted ones, by engine, on a logarithmic
-    axis."""
+    """Draw relative deviations of measured values, by engine, on a logarithmic axis."""
     for engine, own in by_engine(rows, lambda m: m.engine).items():
         off = [max(abs(m.value / predicted(m) - 1), LEAST) for m in own]
         axes.plot(list(map(omega_0, own)), off, ls="none", ms=5, **mark_of(engine))

@@ -63,8 +63,7 @@ class Axis:
 
     @classmethod
     def several(cls, texts: Sequence[str], *kind: Any) -> list[Axis]:
-        """Read several texts as `parse` does; raises `InputError`, for a name that comes twice,
-        too."""
+        """Read several texts as `parse` does; `InputError` for a name that comes twice."""
         axes = [cls.parse(text, *kind) for text in texts]
         names = [axis.name for axis in axes]
         for name in names:
@@ -96,8 +95,7 @@ def check_size(axes: Sequence[Axis], unit: str) -> None:
 
 
 def grid(p: Parameters, axes: Sequence[Axis]) -> Iterator[Parameters]:
-    """Every combination of the axes' values, the last axis fastest; `InputError` if there are more
-    than `MOST`."""
+    """Every combination of the axes' values, the last axis fastest; at most `MOST`."""
     check_size(axes, "runs")
     for values in itertools.product(*(axis.points for axis in axes)):
         yield p.replace(**dict(zip((axis.name for axis in axes), values, strict=True)))
@@ -112,8 +110,7 @@ def random(p: Parameters, axes: Sequence[Axis], count: int, seed: int) -> Iterat
 
 
 def sobol(dimensions: int, count: int, seed: int) -> Array:
-    """The first `count` points (count, dimensions) of a scrambled Sobol sequence in the unit
-    cube."""
+    """The first points (count, dimensions) of a scrambled Sobol sequence in the unit cube."""
     from scipy.stats import qmc  # slow to import
 
     unit = qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random(

@@ -1,5 +1,4 @@
-"""One run as data: everything that determines it, its identity, and how each engine carries it
-out."""
+"""One run as data: all that determines it, its identity, and how engines carry it out."""
 
 from __future__ import annotations
 
@@ -69,8 +68,7 @@ class Task:
 
     @functools.cached_property
     def key(self) -> str:
-        """Hash of all that determines the run: the fields of the task, the program's sources, the
-        engine's version."""
+        """Hash of all that determines the run: the task, sources, the engine's version."""
         engine = self.simulator
         code = {"sources": sources(*engine.sources), **engine.versions}
         text = json.dumps({"task": self.describe(), "code": code}, sort_keys=True)
@@ -105,8 +103,7 @@ class Task:
 
 
 def deadline(limit: float) -> Callable[[float], None]:
-    """A function of the fraction done that raises `TimeoutError` once more than `limit` s of real
-    time have passed."""
+    """A function that raises `TimeoutError` once `limit` s of real time have passed."""
     start = time.monotonic()
 
     def check(done: float) -> None:

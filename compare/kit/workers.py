@@ -43,8 +43,7 @@ PATIENCE = 10.0
 
 @dataclass(eq=False)
 class Workers:
-    """An executor, started when it is needed, and anew when its workers died; threads may share
-    it."""
+    """An executor, started when needed, anew when its workers died; threads may share it."""
 
     count: int
     """Tasks at once."""
@@ -79,8 +78,7 @@ class Workers:
         raise StorageError("workers die as soon as they are started")
 
     def map(self, one: Callable[[Any], Any], items: Iterable[Any]) -> Iterator[Any]:
-        """Python's `map` by the workers, in order; what one that died had to do, or a single one,
-        is done here."""
+        """Python's `map` by the workers, in order; what one that died had to do is done here."""
         if self.count < 2:
             yield from map(one, items)
             return
@@ -99,8 +97,7 @@ class Workers:
 
 
 def processes(count: int) -> Workers:
-    """`count` processes of this machine, one BLAS thread each; for 0 this one. Raises `InputError`
-    for a bad count."""
+    """`count` processes, one BLAS thread each; for 0 this one. May raise `InputError`."""
     check_number("workers", count, "processes", Range(0, whole=True))
     if count == 0:
         return Workers(1, _Here, lambda executor, at_once: None, ())
@@ -127,8 +124,7 @@ def processes(count: int) -> Workers:
 
 
 class _Pool(ProcessPoolExecutor):
-    """Processes that end when the other end of a pipe is closed: by us, to give up their work, or
-    by our death."""
+    """Processes that end when the other end of a pipe is closed, by us or our death."""
 
     def __init__(self, count: int) -> None:
         context = get_context("spawn")
@@ -171,8 +167,7 @@ def _without_signals() -> Iterator[None]:
 
 
 _between = threading.Lock()
-"""Held by a worker between its tasks, while it may be sending a result: half of one would keep the
-parent waiting."""
+"""Held by a worker between tasks: half of a result would keep the parent waiting."""
 
 
 def _call_in_worker(fn: Callable[..., T], *args: Any, **kwargs: Any) -> T:
@@ -253,8 +248,7 @@ def threads(count: int) -> Iterator[ThreadPoolExecutor]:
 
 
 class LateError(BaseException):
-    """What takes too long; no `Exception`, which a judge would take for a breakdown of what it
-    asks."""
+    """What takes too long; no `Exception`, which a judge would take for a breakdown."""
 
 
 @contextmanager

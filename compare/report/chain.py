@@ -1,5 +1,4 @@
-"""The chain of a claim: from its statement to its verdict, each link with the line of the sources
-where it is written."""
+"""The chain of a claim, from statement to verdict, each link with its line of the sources."""
 
 from __future__ import annotations
 
@@ -43,8 +42,7 @@ class Link:
 
 
 def links(claim: Claim, verdict: Verdict | None, summary: Summary) -> list[Link]:
-    """The chain of a claim, without numbers where there is no verdict; `summary` names the files of
-    the measurements."""
+    """The chain of a claim, without numbers where there is no verdict."""
     text = f"{claim.id}: {claim.statement}"
     chain = [Link("statement", text, claim.place), Link("source", f"{claim.source}, {claim.text}")]
     for name in sorted(claim.protocols):

@@ -106,8 +106,7 @@ def sentences(made: Design) -> list[str]:
 
 
 def rows(made: Design) -> dict[str, pages.Rows]:
-    """Tables of a design by title: the best meter of each material, a column each, thresholds, and
-    sensitivities."""
+    """Tables of a design: the best meter of each material, thresholds, sensitivities."""
     off = made.model_error
     best = dict(sorted(made.choices.items(), key=lambda item: -item[1].margin))
     numbers = {

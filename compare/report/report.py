@@ -52,8 +52,7 @@ def write(
 def render(
     evidence: Evidence, verdicts: Sequence[Verdict], summary: Summary, spread: Spread = map
 ) -> str:
-    """The page as text; what was not run is named in one line, a figure that can't be drawn is a
-    gap."""
+    """The page as text; what was not run is named in one line."""
     directory, option = evidence.directory, _OPTIONS[Level[summary.level]]
     ran = [verdict for verdict in verdicts if verdict.outcome is not Outcome.NOT_RUN]
     free = {name: each for name, each in FIGURES.items() if not each.claims}
@@ -164,8 +163,7 @@ def _opening_sentence(ran: Sequence[Verdict]) -> str:
 
 @functools.cache
 def errata() -> str:
-    """The errata of the paper as HTML; links into the source tree, which a page by itself can't
-    follow, are text."""
+    """The errata of the paper as HTML; links into the source tree are text."""
     text = (resources.files("compare.report") / "templates" / "errata.md").read_text("utf-8")
     made: str = MarkdownIt("commonmark", {"html": False}).enable("table").render(text)
     made = re.sub(r"<h1>.*?</h1>", "", made)  # the page has a heading for it
@@ -178,8 +176,7 @@ def errata() -> str:
 
 
 def columns(records: Records, checks: Mapping[str, Sequence[Check]]) -> dict[str, list[Any]]:
-    """Columns of the page's searchable table: a row for each check, and each measurement on which
-    no claim bears."""
+    """Columns of the page's searchable table: each check, and each unjudged measurement."""
 
     # the same for a copy that another process has judged
     def identity(
@@ -221,8 +218,7 @@ def columns(records: Records, checks: Mapping[str, Sequence[Check]]) -> dict[str
 
 
 def packed(of: Mapping[str, Sequence[Any]]) -> str:
-    """Columns and their texts typeset, as JSON, compressed (deflate) and in base64: about a tenth
-    of their length."""
+    """Columns and their texts typeset, as JSON, deflated, in base64: a tenth as long."""
     shown = {
         text: pages.typeset(text) for text in dict.fromkeys([*of["quantity"], *of["conditions"]])
     }

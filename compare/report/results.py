@@ -1,5 +1,4 @@
-"""The results directory: run files, measurements, the summary of the verdicts, figures, the
-report."""
+"""The results directory: runs, measurements, the summary of verdicts, figures, report."""
 
 from __future__ import annotations
 
@@ -41,14 +40,12 @@ class Summary:
     measurements: Files = field(default_factory=dict)
     """Those that were judged."""
     verdicts: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    """By claim id: outcome, number of checks, resolving power; the checks follow from the
-    measurements."""
+    """By claim id: outcome, number of checks, resolving power."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
     def of(cls, verdicts: Iterable[Verdict], level: Level, measured: Files) -> Summary:
-        """The summary of verdicts that were reached now, on the measurements in the files
-        `measured`."""
+        """The summary of verdicts that were reached now, on measurements in files."""
         provenance = {
             "versions": dict(current_versions()),
             "commit": current_commit(),
@@ -127,8 +124,7 @@ def described(verdict: Verdict) -> dict[str, Any]:
 
 
 def _outcome(verdict: Verdict) -> dict[str, Any]:
-    """A verdict in numbers, without its checks: outcome, counts, resolving power, what each engine
-    says; JSON-able."""
+    """A verdict in numbers, without its checks, and what engines say; JSON-able."""
     about = {"id": verdict.claim.id, "verdict": verdict.outcome, "passed": verdict.passed}
     counts = {
         name: sum(getattr(check, name) for check in verdict.checks)

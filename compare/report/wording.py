@@ -1,5 +1,4 @@
-"""Numbers, conditions and verdicts as a reader sees them, in the terminal and on the page. Nothing
-reads them back."""
+"""Numbers, conditions and verdicts as a reader sees them; nothing reads them back."""
 
 from __future__ import annotations
 
@@ -19,8 +18,7 @@ from model import Case
 SYMBOLS = {name: each.symbol for name, each in QUANTITIES.items()} | {
     n: n for n in ("v_h", "n_x", "n_y", "n_z")
 }
-"""How quantities and named conditions are written, where that isn't their name without
-underscores."""
+"""How quantities and conditions are written, where that isn't their name."""
 _UNITS = {"h": "m", "v_h": "m s-1", "f": "Hz", "amplitude": "rad s-1", "rate": "rad s-2"}
 _UNITS |= {name: each.unit for name, each in QUANTITIES.items()}
 MARKS = {
@@ -40,8 +38,7 @@ def size(value: float, sign: str = "") -> str:
 
 
 def value(m: Measurement, of: float) -> str:
-    """A value of the measurement's quantity as text; cases by their names, of what is tiny its size
-    alone."""
+    """A value of the measurement's quantity; cases by name, of what is tiny its size."""
     if not math.isfinite(of):
         return "none" if math.isnan(of) else f"{of:g}"
     if m.quantity == "case":
@@ -52,8 +49,7 @@ def value(m: Measurement, of: float) -> str:
 
 
 def conditions(of: Mapping[str, Condition]) -> str:
-    """Named conditions as text: "case SS, from above, y = 0.02 m"; states that are 0 are left
-    out."""
+    """Conditions as text: "case SS, from above, y = 0.02 m"; without states that are 0."""
     said = []
     for name, each in of.items():
         plain = name.replace("_", " ")
@@ -89,8 +85,7 @@ def mark(check: Check) -> str:
 
 
 def ranked(checks: Sequence[Check]) -> list[Check]:
-    """Checks, the worst first: what fails, then what is too coarse, then by deviation divided by
-    tolerance."""
+    """Checks, the worst first: failed, too coarse, then by deviation over tolerance."""
     return sorted(checks, key=lambda check: (check.agrees, check.conclusive, -check.share))
 
 
@@ -122,8 +117,7 @@ def findings(verdict: Verdict) -> dict[str, str]:
 
 
 def noticed_errors(powers: Mapping[str, float]) -> str:
-    """In words which errors of theory would be noticed, by resolving power; empty where all
-    quantities are counts."""
+    """In words which errors of theory would be noticed; empty if all are counts."""
     alike: dict[str, list[str]] = {}
     for name, power in powers.items():
         if quantity(name).resolution:
@@ -145,8 +139,7 @@ def coarsest(said: EngineVerdict) -> float:
 
 
 def engine_outcome(said: EngineVerdict) -> str:
-    """In words the outcome by an engine beside the one on trial, and to what relative error it
-    confirms."""
+    """In words the outcome by an engine, and to what relative error it confirms."""
     if said.outcome is not Outcome.CONFIRMED:
         return said.outcome
     power = coarsest(said)
@@ -175,8 +168,7 @@ def percent(share: float) -> str:
 
 
 def engines(ran: Sequence[Verdict]) -> list[dict[str, Any]]:
-    """What each engine says of all claims: what it is, how many came out how, which it refutes, its
-    deviations."""
+    """What each engine says of all claims: how many came out how, its deviations."""
     rows = []
     for name in dict.fromkeys(each.engine for verdict in ran for each in verdict.engines):
         own = [
@@ -248,8 +240,7 @@ def _subjects(ran: Sequence[Verdict], engine: str) -> dict[str, Any]:
 
 
 def headline(ran: Sequence[Verdict]) -> str:
-    """All verdicts in a sentence: the claims that failed or are undecided, or that the engine
-    agrees."""
+    """All verdicts in a sentence: what failed or is undecided, or that all agrees."""
     parts, bad = [], [verdict for verdict in ran if not verdict.passed]
     undecided = [verdict.claim.id for verdict in bad if verdict.outcome is Outcome.INCONCLUSIVE]
     failed = [verdict.claim.id for verdict in bad if verdict.outcome is not Outcome.INCONCLUSIVE]
@@ -268,8 +259,7 @@ def headline(ran: Sequence[Verdict]) -> str:
 
 
 def by_kind(ran: Sequence[Verdict]) -> list[tuple[str, str]]:
-    """Counts of claims that came out as expected, by kind, and of those that didn't; each with what
-    it counts."""
+    """Counts of claims as expected, by kind, and of others; each with what it counts."""
     passed = [verdict for verdict in ran if verdict.passed]
     left = sum(verdict.outcome is Outcome.INCONCLUSIVE and not verdict.passed for verdict in ran)
     counts = {
@@ -282,8 +272,7 @@ def by_kind(ran: Sequence[Verdict]) -> list[tuple[str, str]]:
 
 
 def coarse_and_missing(ran: Sequence[Verdict]) -> str:
-    """How many numbers are too coarse or missing, and what follows from that, in a sentence; empty
-    if none is."""
+    """How many numbers are too coarse or missing, in a sentence; empty if none is."""
     coarse = sum(not check.conclusive for verdict in ran for check in verdict.checks)
     left_out = sum(each.rows for each in {each for verdict in ran for each in verdict.missing})
     parts = [f"{coarse} of these numbers are too coarse to tell"] * (coarse > 0)

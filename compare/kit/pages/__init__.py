@@ -1,5 +1,4 @@
-"""Pages that need nothing but themselves, filled in from templates that share `base.html`; and
-tables of text."""
+"""Self-contained pages, from templates that share `base.html`; and tables of text."""
 
 from __future__ import annotations
 
@@ -99,8 +98,7 @@ show them as they are."""
 
 
 def typeset(text: str) -> str:
-    """Text of a page with symbols such as ω_c, ω₀ or η as mathematics, in HTML; all else is
-    escaped."""
+    """Text of a page in HTML, with symbols such as ω_c, ω₀ or η as mathematics."""
     import markupsafe  # comes with jinja2
 
     def symbol(found: re.Match[str]) -> str:
@@ -118,8 +116,7 @@ def typeset(text: str) -> str:
 
 
 def render(package: str, template: str, **values: Any) -> str:
-    """A template of a package, filled in; what is not marked safe is escaped, a value that is
-    missing is an error."""
+    """A template of a package, filled in and escaped; a missing value is an error."""
     import jinja2  # here, because the terminal has no pages
     import markupsafe
 
@@ -137,8 +134,7 @@ def render(package: str, template: str, **values: Any) -> str:
 
 
 def markdown(rows: Rows) -> str:
-    """A table in Markdown; columns of short cells, most of them numbers, are set to the right, and
-    not broken."""
+    """A table in Markdown; columns of short cells, most of them numbers, to the right."""
     short = [all(len(cell) <= 9 for cell in column[1:]) for column in zip(*rows, strict=True)]
     cells = [rows[0], ["--:" if k and short[k] else "---" for k in range(len(short))], *rows[1:]]
     return "\n".join(

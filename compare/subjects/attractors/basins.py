@@ -60,8 +60,7 @@ class Basins:
         return int(np.sum(self.attractors == ATTRACTORS.index(attractor))), self.attractors.size
 
     def differences(self) -> Array:
-        """Distances from a boundary of the points at which MuJoCo and theory differ, in cells of
-        the fine map."""
+        """Distances from a boundary, in fine cells, of points where MuJoCo differs."""
         from scipy.ndimage import distance_transform_cdt  # slow to import
 
         distance = np.zeros(self.attractors.shape)
@@ -78,8 +77,7 @@ class Basins:
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """Inverse of `save`; raises `StorageError` if the file can't be read, or is none of
-        these."""
+        """Inverse of `save`; raises `StorageError` for what can't be read."""
         with reading_json(Path(path), "basins") as data:
             if "fates" in data:  # what files of before call them
                 data["attractors"] = data.pop("fates")

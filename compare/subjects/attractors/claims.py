@@ -1,5 +1,4 @@
-"""Claims beyond the paper, which asks whether periodic attractors exist: a ball that hops for
-ever."""
+"""Claims beyond the paper: periodic attractors exist, as a ball that hops for ever."""
 
 from __future__ import annotations
 
@@ -40,8 +39,7 @@ def _rebounding(m: Measurement) -> Orbit:
 
 
 def _eta_at_torus(orbit: Orbit) -> float:
-    """The wall friction at which multipliers leave the unit circle, on the branch of an orbit; nan
-    if they don't."""
+    """The wall friction at which multipliers leave the unit circle; nan if they don't."""
     branch = orbit_branch.follow(orbit, "eta", orbit.p.eta, 1.1 * orbit.p.eta)
     return next(
         (place.value for place in branch.places if place.kind is Bifurcation.TORUS), math.nan
@@ -73,15 +71,13 @@ def _orbit_criteria(protocol: str, *quantities: str) -> tuple[Criterion, ...]:
 
 
 def _after_rest(m: Measurement) -> float:
-    """The settled state of theory from rest, after 60/c: the slowest part decays with a time
-    constant 2 (1 + 2 j)/c."""
+    """The settled state of theory from rest, after 60/c: thirty times the slowest decay."""
     run = simulated(m.parameters, (0.0,) * 6, 60.0 / m.parameters.c)
     return float(getattr(run, m.quantity)[-1])
 
 
 def _only_lasting(m: Measurement) -> float:
-    """Case or omega_c of the only stationary motion that attracts, by Definitions 1-3; nan if there
-    are more."""
+    """Case or omega_c of the only stationary motion that attracts; nan if there are more."""
     those = analytic.stable_solutions(m.parameters)
     lasts = those[0].case if m.quantity == "case" else those[0].state.omega_c
     return float(lasts) if len(those) == 1 else math.nan

@@ -1,5 +1,4 @@
-"""Beyond the paper: the ball that hops for ever, Figs. 9, 10 and 13 with the branch of such
-motions, maps of basins."""
+"""Beyond the paper: the ball that hops for ever, the branch of such motions, basins."""
 
 from __future__ import annotations
 
@@ -36,8 +35,7 @@ STARTS = 20
 
 @functools.cache
 def _hopping_orbit(p: Parameters) -> orbits.Orbit | None:
-    """The orbit of a ball that hops for ever: by Newton's method from a guess, or of a random
-    start, if any hops."""
+    """The orbit of a ball that hops for ever, from a guess or a random start, if any."""
     if p == SET:
         return orbits.refine(p, (6.37e-3, 0.0, 57.3, -106.2, 0.0, 0.0), 0.222)
     found = (each.limit.orbit for each in analytic.attractors(p, STARTS, seed=0))

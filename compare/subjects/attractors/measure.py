@@ -60,8 +60,7 @@ DISTURBED = 2.0
 HOPS_DIVISORS = (16, 32)
 """Time steps in a coarse one."""
 SAMPLE = 1e-3
-"""Time between samples, s: a parabola through three samples then gives a top to 1e-6 of the
-height."""
+"""Time between samples, s: a parabola through three gives a top to 1e-6 of the height."""
 FOLLOWED = 10.0
 """How long a hop is followed at a wall, s."""
 LEFT_ALONE = 60.0
@@ -177,8 +176,7 @@ class Hops(NamedTuple):
 
 
 def tops(run: Trajectory, start: float, end: float) -> Hops:
-    """The tops of the hops between two times, those at least half as high as the highest of
-    them."""
+    """The tops of hops between two times, at least half as high as the highest."""
     t, y = run.time, run.y
     k, late = peaks(y)
     inside = (t[k] > start) & (t[k] < end)
@@ -209,8 +207,7 @@ def hop_map(states: Array, p: Parameters) -> tuple[float, State]:
 
 
 def birth(flows: Sequence[float], heights: Sequence[float]) -> Estimate:
-    """Flow at which hops would have no height: a parabola through the last three; a line shows the
-    uncertainty."""
+    """Flow at which hops would have no height: by a parabola, uncertain by a line."""
     parabola, line = (float(np.polyfit(heights[-n:], flows[-n:], n - 1)[-1]) for n in (3, 2))
     return estimate(parabola, degree=abs(parabola - line))
 
@@ -221,8 +218,7 @@ are short: their starts are extrapolated from one or two hops, which attract fro
 
 
 def followed(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """The wall friction beyond which disturbances of the hop grow, and whether balls hop on, on
-    both sides of it."""
+    """The wall friction beyond which disturbances grow; do balls hop on, on both sides?"""
     p = Parameters.named(SET)
     walls = [p.replace(eta=share * p.eta) for share in WALLS]
     etas = [q.eta for q in walls]
@@ -361,8 +357,7 @@ def _swing(run: Trajectory, start: float) -> tuple[float, float, float]:
 
 
 def calm(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """Whether balls still hop after 60/c of the weakest drag, or how they go round: three of each
-    of 16 sets."""
+    """Whether balls hop after 60/c of the weakest drag: three of each of 16 sets."""
     reference, rng, tasks = sets["reference"], np.random.default_rng(5), []
     low, high = np.array([0.05, 0.05, 0.2, 2.0, 0.5]), np.array([1.0, 1.0, 0.6, 8.0, 6.0])
     for mu, eta, j, kappa, Omega_0 in (low + sobol(len(low), 16, 5) * (high - low)).tolist():

@@ -1,5 +1,4 @@
-"""The ball as a flowmeter (section 5.3): slope, range and hysteresis of its characteristic curve,
-unloading, pushes."""
+"""The flowmeter (section 5.3): slope, range and hysteresis, unloading, pushes."""
 
 from __future__ import annotations
 
@@ -32,15 +31,13 @@ from model.drag import QUADRATIC, STOKES
 
 _SIMULATED = "analytic.simulate"
 RTOL = 1e-9
-"""Relative tolerance of simulations of unloading and pushes: the speed of a landing is measured to
-1e-6."""
+"""Relative tolerance of simulations: the speed of a landing is measured to 1e-6."""
 
 
 def _slope(
     by: str, predict: Callable[[Measurement], float], function: str, *cases: Case
 ) -> tuple[Criterion]:
-    """A criterion on slopes of the characteristic curve that were measured in one way, in some
-    cases."""
+    """A criterion on slopes of the curve measured in one way, in some cases."""
     when = all_of(given(by=by), is_in(*cases))
     return (Criterion("slope", "slope", predict, when=when, by=f"analytic.{function}"),)
 
@@ -51,8 +48,7 @@ def _slope_at(m: Measurement) -> float:
 
 
 def _only_rolling(m: Measurement) -> float:
-    """The case: RR within the operating range, from every start; beyond it one that lasts, and not
-    RR."""
+    """The case: RR within the operating range; beyond it one that lasts, and not RR."""
     if m.parameters.omega_0 < analytic.operating_range(m.parameters):
         return float(Case.RR)
     # The start that shows that the range has ended: the ball slips on the floor, or stays on the
@@ -64,8 +60,7 @@ def _only_rolling(m: Measurement) -> float:
 
 
 def _reads_flow(m: Measurement) -> float:
-    """omega_0 within the reading range; beyond it, that of slipping on the floor, which is less:
-    never for eta > j."""
+    """omega_0 within the reading range; beyond, that of slipping on the floor: less."""
     p = m.parameters
     within, reads = p.omega_0 < analytic.reading_range(p), float(solution_of(m).state.omega_c)
     if not within and (lifts_first(m) or (case_of(m) is not Case.NR and reads >= p.omega_0)):
@@ -74,8 +69,7 @@ def _reads_flow(m: Measurement) -> float:
 
 
 def _loop_case(m: Measurement) -> Case:
-    """Case at a level of the hysteresis loop: that of the branch it comes from while it attracts,
-    else of the other."""
+    """Case at a level of the loop: of the branch it comes from, or else of the other."""
     states = lasting_cases(m.parameters) - {Case.NS}
     lifted = m.text("before") == Case.NR.name
     here = {case for case in states if (case is Case.NR) == lifted}
@@ -85,8 +79,7 @@ def _loop_case(m: Measurement) -> Case:
 
 
 def _jumps(way: int) -> When:
-    """A filter of levels of the hysteresis loop: the ball was lifted off the floor (1), came down
-    (-1), or neither."""
+    """A filter of levels of the loop: the ball was lifted (1), came down (-1), or neither."""
     return lambda m: (case_of(m) is Case.NR) - (m.text("before") == Case.NR.name) == way
 
 
@@ -155,8 +148,7 @@ def _nominal_friction(m: Measurement, off: float) -> dict[str, float]:
 
 
 def _one_end(m: Measurement) -> bool:
-    """Whether one and the same threshold ends the range of these meters at every corner of their
-    tolerances."""
+    """Whether one threshold ends the range of these meters at all their tolerances."""
     p, spread = m.parameters, (1 + OFF) / (1 - OFF)
     return not p.eta / spread < p.j < p.eta * spread
 
@@ -172,8 +164,7 @@ def _exact(m: Measurement) -> float:
 
 
 def _worst(m: Measurement) -> float:
-    """The flow up to which a design covers a meter of nominal friction, whatever it is within the
-    tolerance."""
+    """The flow up to which a design covers a meter of nominal friction, at worst."""
     nominal = _nominal_friction(m, OFF)
     return design.choice(
         m.parameters.replace, nominal, dict.fromkeys(nominal, OFF), fastest=1.0
@@ -181,16 +172,14 @@ def _worst(m: Measurement) -> float:
 
 
 def _end_of_spread(m: Measurement, end: int) -> float:
-    """The lowest (end 0) or highest (1) value of a threshold that a design gives for a meter's
-    tolerance."""
+    """The lowest (end 0) or highest (1) threshold that a design gives for a tolerance."""
     nominal = _nominal_friction(m, (OFF, -OFF)[end])
     corners = list(design.corners(m.parameters.replace, nominal, dict.fromkeys(nominal, OFF)))
     return design.threshold_spread(corners)[m.quantity][end]
 
 
 def _by_sensitivity(m: Measurement) -> float:
-    """omega_02 extrapolated from a wall of half the friction by the power of eta that is the
-    design's sensitivity."""
+    """omega_02 from half the wall's friction, by the design's sensitivity to it."""
     p, half = m.parameters, {"eta": m.parameters.eta / 2}
     power = design.sensitivities(p.replace, half)["omega_02"]["eta"].value
     return analytic.thresholds(p.replace(**half)).omega_02 * 2**power

@@ -1,5 +1,4 @@
-"""Characteristic curves of the flowmeter with settled states, Fig. 13, the fall at unloading; a
-designed meter."""
+"""Characteristic curves with settled states, Fig. 13, the fall at unloading; a design."""
 
 from __future__ import annotations
 
@@ -28,8 +27,7 @@ _WAYS = {"up": ("^", ", flow raised"), "down": ("v", ", flow lowered")}
 
 
 def select_curves(evidence: Evidence) -> tuple[Diagram, ...]:
-    """The settled states of every engine with the two sets of the paper's kind, without balls that
-    only sink (NS)."""
+    """The settled states of every engine with two sets, without balls that only sink."""
     settled = [
         m
         for m in evidence.select("omega_c", "case")
@@ -47,8 +45,7 @@ def select_curves(evidence: Evidence) -> tuple[Diagram, ...]:
 
 
 def draw_curves(curves: tuple[Diagram, ...]) -> tuple[Figure, str]:
-    """A figure with a column for each of two sets: characteristic curve, and deviations from it;
-    and its caption."""
+    """A figure of two sets: characteristic curve, and deviations from it; its caption."""
 
     def nearest_prediction(m: Measurement) -> float:
         omega_c = [float(s.state.omega_c) for s in analytic.stable_solutions(m.parameters)]
@@ -86,8 +83,7 @@ def draw_curves(curves: tuple[Diagram, ...]) -> tuple[Figure, str]:
 
 
 def draw_figure_13(of: Diagram) -> tuple[Figure, str]:
-    """A panel of Fig. 13: the characteristic curve and measured states, with both scales; and its
-    caption."""
+    """A panel of Fig. 13: the characteristic curve and measured states; its caption."""
     p, rises = of.p, of.figure == "fig-13-left"
     only_where(p, folds=rises)
     figure, axes = style.panels(6.0, 4.3)
@@ -172,8 +168,7 @@ def top_flow(p: Parameters) -> float:
 
 
 def theory(axes: Axes, p: Parameters, fastest: float) -> bifurcation.Thresholds:
-    """Draw all stationary solutions up to the fastest flow, but for unstable SR; return the
-    thresholds."""
+    """Draw stationary solutions up to a flow, but unstable SR; return the thresholds."""
     t, folds, (rolls, rides) = bifurcation.thresholds(p), p.eta < p.j, stable_ends(p)
     spans: list[tuple[tuple[Case, ...], tuple[float, float], float]] = [
         ((Case.RR,), (0.0, rolls if folds else t.omega_02), 0.45),
@@ -195,8 +190,7 @@ def theory(axes: Axes, p: Parameters, fastest: float) -> bifurcation.Thresholds:
 
 
 def names_within(axes: Axes) -> None:
-    """Move names of curves that would stick out of axes, which have their limits and labels, so
-    that they don't."""
+    """Move names of curves that would stick out of axes, once these have limits."""
     if figure := axes.get_figure(root=True):
         figure.draw_without_rendering()
         low, high = axes.get_window_extent().get_points()
@@ -282,8 +276,7 @@ def draw_fall(of: Diagram) -> tuple[Figure, str]:
 
 
 def _loop(evidence: Evidence) -> Iterator[Measurement]:
-    """Settled states of a flow that is raised and lowered in held steps, and those on the edge
-    between two motions."""
+    """Settled states of a flow that rises and falls in steps, and those on the edge."""
     yield from (m for m in evidence.select("omega_c", "side") if m.text("side") in _WAYS)
     yield from evidence.select("edge_omega_c")
 
@@ -318,8 +311,7 @@ _LABELS = {name: f"$\\{name}$" for name in ("mu", "eta", "rho_b", "rho_f", "nu_f
 
 
 def draw_readings(made: Design) -> tuple[Figure, str]:
-    """A figure of a design: reading over flow, with the band of the tolerances and the limits; and
-    its caption."""
+    """A figure of a design: reading over flow, band and limits; and its caption."""
     curve, chosen, request = made.curve, made.choice, made.request
     figure, axes = style.panels(7.0, 4.3)
     flows, low, high, below, above = (
@@ -380,8 +372,7 @@ def draw_sensitivities(made: Design) -> tuple[Figure, str]:
 
 
 def draw_friction(made: Design) -> tuple[Figure, str]:
-    """A map of the operating limit of the chosen ball and vessel over both frictions; and its
-    caption."""
+    """A map of the operating limit of a chosen meter over frictions; and its caption."""
     chosen = made.choice
     top = {name: max(1.5 * chosen.values[name], 1.25 * chosen.p.j) for name in ("mu", "eta")}
     mu, eta = (np.linspace(top[name] / 50, top[name], 51) for name in ("mu", "eta"))

@@ -53,8 +53,7 @@ NEIGHBOURS = (-1e-3, -5e-4, 5e-4, 1e-3)
 
 
 def slope(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """Slopes at the settled states, the jump where slipping sets in, and the mean slope from there
-    to unloading."""
+    """Slopes at settled states, the jump where slip sets in, the mean to unloading."""
     most = runner.sampling.slope_slipping
     curves = [curve for name, p in sets.items() for curve in _curves(name, p, records, most)]
     # With a factor on the drift limit of settled states: for the jump they lie close together.
@@ -265,13 +264,11 @@ UNLOADED_FROM = 1.02
 UNLOADED_TO = 0.95
 """The flow after it, in the same unit."""
 WALL_PUSH = 1e-2
-"""Speed of a push on the wall in units of sqrt(g R), or more spin in units of its spin on the
-wall."""
+"""Speed of a push in units of sqrt(g R), or more spin in units of that on the wall."""
 
 
 def unloading(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """How a ball that rides the wall slips, falls and lands as the flow falls, or is lifted by a
-    push."""
+    """How a ball on the wall slips, falls and lands as the flow falls, or is pushed."""
     starts, pairs = [], []
     for name, p in sets.items():
         if (limit := records.threshold(name, "omega_02")) is None:
@@ -380,8 +377,7 @@ def _pair(runner: Runner, state: SteadyState, name: str) -> StepPair:
 
 
 def _landed(run: Trajectory) -> dict[Shown, Estimate]:
-    """Onset of slip, and landing: time, speed and vertical impulse. Empty if the ball doesn't
-    land."""
+    """Onset of slip, and landing: time, speed, vertical impulse. Empty without one."""
     p, step = run.header.parameters, float(run.time[1] - run.time[0])
     slip = run.slip_speed_B / math.sqrt(p.g * p.R)
     touches = np.flatnonzero(run.force_A[:, 1] > 0)

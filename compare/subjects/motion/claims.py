@@ -1,5 +1,4 @@
-"""What holds at every instant, what a landing leaves, the drag of the fluid, and the equations of
-motion (23)-(29)."""
+"""Laws at every instant, landings, the fluid's drag, the equations of motion (23)-(29)."""
 
 from __future__ import annotations
 
@@ -40,8 +39,7 @@ def _sinking(m: Measurement) -> float:
 
 
 def _fallen(m: Measurement) -> float:
-    """Height in m of a thrown ball at the end: the start's height less the depth whose
-    `drag.fall_time` is the time."""
+    """Height, m, of a thrown ball at the end, by the depth whose `fall_time` is the time."""
     p, (y, v_y, *_) = m.parameters, state(m)
     fall = brentq(lambda fall: drag.fall_time(fall, v_y, p) - m.at("time"), 1e-6 * p.R, 100 * p.R)
     return y - float(fall)
@@ -81,8 +79,7 @@ def _rolls_or_slips(holds: Callable[[Case, Measurement], bool], m: Measurement) 
 
 
 def _braked_rolls(m: Measurement) -> float:
-    """The case of a ball whose spin the fluid brakes: RR, if friction suffices for it; LookupError
-    else."""
+    """RR for a ball whose spin the fluid brakes, if friction suffices; else LookupError."""
     if not real_fluid.rolling(m.parameters).friction < 1:
         raise LookupError("friction doesn't balance the fluid's torque")
     return float(Case.RR)

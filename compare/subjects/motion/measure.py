@@ -178,8 +178,7 @@ def laws(runner: Runner, sets: Sets, records: Records) -> Measured:
 
 
 def deviations(runs: Sequence[Trajectory]) -> dict[ContactLaw, float]:
-    """How far runs of one set are from every law, dimensionless; nan where no sample can show
-    it."""
+    """How far runs are from every law, dimensionless; nan where no sample can show it."""
 
     def largest(values: Array, off: float) -> float:
         return float(values[np.argmax(np.abs(values - off))]) if len(values) else math.nan
@@ -375,8 +374,7 @@ def _values(
 
 
 def turns_or_hovers(case: Case, run: Trajectory, window: slice) -> bool:
-    """Whether a slipping contact carries almost no load, or its slip, by itself or by friction,
-    changes too much."""
+    """Whether a slipping contact carries almost nothing, or its slip changes too much."""
     p, time = run.header.parameters, float(np.ptp(run.time[window]))
     loads = (p.mu, run.force_A[window, 1]), (p.eta, run.force_B[window, 0])
     for v, contact, (friction, load) in zip(
@@ -429,8 +427,7 @@ late."""
 
 
 def motions(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """The case at the end of every piece, and how the ball turns there, with the state at its
-    beginning."""
+    """The case at the end of every piece, and how the ball turns there."""
     starts = [_start(name, p, *start) for name, p in sets.items() for start in STARTS]
     tasks = []
     for start in starts:
@@ -647,8 +644,7 @@ def late_ramp(p: Parameters, rate: float, time: float) -> Flow:
 
 
 def torque(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """Case and omega_c to which a ball settles from rest whose spin the fluid brakes, as
-    `Parameters.fluid_torque`."""
+    """Case and omega_c from rest of a ball whose spin the fluid brakes."""
     starts = []
     for name, p in sets.items():
         q = p.replace(mu=1.0, eta=1.0, fluid_torque=0.5 * p.c, omega_0=0.6 / time_unit(p))
@@ -657,8 +653,7 @@ def torque(runner: Runner, sets: Sets, records: Records) -> Measured:
 
 
 def whole_runs(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """Where each start ends: its state, or on a smooth wall and a rough floor its case and
-    orbit."""
+    """Where each start ends: its state; on smooth walls, rough floors case and orbit."""
     for run in carry_out(
         runner, "runs", [pair for name, p in sets.items() for pair in _pairs(name, p)]
     ):

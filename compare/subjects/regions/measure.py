@@ -70,8 +70,7 @@ class Plane:
 
 
 def planes(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """Bit masks of the cases reached, SR counted as NR; a point of which a run does not settle is
-    left out."""
+    """Bit masks of the cases reached, SR counted as NR; without points that don't settle."""
     from scipy.stats import qmc  # slow to import
 
     # In such drag states settle within seconds, and slipping still lasts beyond the flow at which
@@ -144,8 +143,7 @@ FAR_FROM_EDGE = 0.1
 ARRIVED = 0.01
 """Distance at which a ball has arrived, divided likewise."""
 CLOSING = (0.1, 0.17, 0.26, 0.38)
-"""Flows, as parts of the way from omega_02 to omega_04, from which the edge is followed to where it
-begins."""
+"""Flows, as parts of the way from omega_02 to omega_04, on the way to where the edge begins."""
 
 
 SWINGS_ON = "on the border the ball swings on: quadratic drag of a slight lag damps next to nothing"
@@ -229,8 +227,7 @@ def borders(runner: Runner, sets: Sets, records: Records) -> Measured:
 
 @dataclass(frozen=True, eq=False)
 class Edge:
-    """The border between the basins of two attractors at one flow, and where it crosses a line;
-    states are (8,)."""
+    """The border between two basins at one flow, and where it crosses a line."""
 
     set: str
     p: Parameters
@@ -250,8 +247,7 @@ class Edge:
         return np.asarray(self.centre + self.bracket.place.value * self.line)
 
     def crossed(self, line: Edge, bracket: Bracket) -> Edge:
-        """The edge after the search on one more line: with the bracket found there, or counted as
-        missed."""
+        """The edge after one more line: with the bracket found there, or missed."""
         if None in bracket.runs:
             return replace(self, moves=(), missed=self.missed + 1)
         crossed = replace(line, bracket=bracket, missed=0)
@@ -262,8 +258,7 @@ class Edge:
 
 
 def _on_floor_and_wall(x: Array) -> Array:
-    """The state put on floor and wall, with y, v_y, h and v_h zero: a lifted ball moves alike at
-    every height."""
+    """The state put on floor and wall: a lifted ball moves alike at every height."""
     return State.of(x)._replace(y=0.0, v_y=0.0, h=0.0, v_h=0.0).stacked()
 
 
@@ -369,8 +364,7 @@ def _edge_rows(runner: Runner, edge: Edge) -> Measured:
 FIRST_DRAGS = (2.0, 4.0)
 """Drag at which the range of slipping is measured first, c sqrt(R/g)."""
 NEARER_DRAGS = (1.6, 2.6)
-"""Drag measured then, in units of that extrapolated from those: far off, where states settle
-soon."""
+"""Drag measured then, in units of that extrapolated from those: states settle soon."""
 BEFORE_FOLD = (0.02, 0.035, 0.055, 0.08, 0.12)
 """Distances of flows below omega_02, in parts of the range of slipping."""
 

@@ -1,5 +1,4 @@
-"""Claims about slip: does a slight one grow or die out, where does the ball lift off (sections 3
-and 4, Fig. 6)?"""
+"""Slip: does a slight one grow, where does the ball lift off (sections 3 and 4, Fig. 6)?"""
 
 from __future__ import annotations
 
@@ -60,8 +59,7 @@ def _gamma_nr(m: Measurement) -> float:
 
 
 def _by_forces(m: Measurement) -> float:
-    """gamma from the forces of NR: friction that rolling needs along the slip, minus eta times the
-    normal force."""
+    """gamma from the forces of NR: friction that rolling needs along the slip, less eta B_x."""
     p = m.parameters
     _, (B_x, B_y, B_z) = analytic.contact_forces(Case.NR, _state(m), p)
     return float(

@@ -1,5 +1,4 @@
-"""Figs. 4 and 5: a ball carried by the wall is pushed into a slight slip, which dies out or
-grows."""
+"""Figs. 4 and 5: a ball on the wall is pushed into a slight slip, which dies out or grows."""
 
 from __future__ import annotations
 
@@ -16,13 +15,11 @@ from compare.kit.drawing import Diagram, diagram
 from model import Case
 
 BETA = 0.9
-"""Direction (54) of the push, rad: across the direction in which slip dies out or grows, so that
-the path bends."""
+"""Direction (54) of the push, rad: across that of decay, so that the path bends."""
 PUSHED = 1.0
 """Size of the push, rad s-1."""
 MOTIONS = {"fig-4": (1.38, 3.4), "fig-5": (0.88, 0.17)}
-"""Flows above and below omega_02, in units of it, and times of motions, in units of sqrt(R/g): in
-Fig. 4 slip ends."""
+"""Flows in units of omega_02, and times in units of sqrt(R/g): in Fig. 4 slip ends."""
 
 
 def draw(of: Diagram) -> tuple[Figure, str]:

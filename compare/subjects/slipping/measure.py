@@ -65,8 +65,7 @@ PUSHES = {
     (Case.SR, Case.SS): 3,
     (Case.NR, Case.NS): 3,
 }
-"""Arrows of Fig. 6 along which a contact begins to slip, and directions out of random states at the
-quick level."""
+"""Arrows of Fig. 6 along which slip begins, and directions at the quick level."""
 SLIPS = {Case.RS: (1,), Case.SR: (0,), Case.SS: (0, 1, 2), Case.NS: (1, 2)}
 """Which of slip_x, slip_y, slip_z a case allows beyond the one it leaves."""
 
@@ -93,14 +92,12 @@ AT_START = slope_error(
 ) / slope_error(
     np.arange(-step_pairs.HALF_WINDOW, step_pairs.HALF_WINDOW + 1.0), step_pairs.WINDOW_DEGREES[0]
 )
-"""Uncertainty of a rate extrapolated to the start of a record, relative to that at the centre of a
-window."""
+"""Uncertainty of a rate at the start of a record, relative to that amid a window."""
 FRICTIONLESS = "without friction at both contacts there is nothing that rolls"
 
 
 def measure(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """gamma out of random states, along every arrow; where one contact may slip to either side,
-    their shares (69)."""
+    """gamma out of random states, along every arrow; of two sides their shares (69)."""
     rough = {name: p for name, p in sets.items() if p.mu and p.eta}
     yield from (Missing("growth", name, FRICTIONLESS) for name in sets if name not in rough)
     sides = [
@@ -174,8 +171,7 @@ class Push:
         return SMALL_SLIPS if self.outer in (Case.RS, Case.SR) else LARGE_SLIPS
 
     def pair(self, runner: Runner, size: float, divisor: int = 1) -> list[Task]:
-        """Tasks with one size of slip, in units of `start_unit`, with both time steps, divided by
-        `divisor`."""
+        """Tasks with one size of slip and both time steps, divided by `divisor`."""
         p, x = self.start.p, self.start.x0.copy()
         x[SLIP_XYZ] += size * start_unit(p, x) * self.n
         steps, step = RECORD_STEPS * divisor, coarse_step(p) / (step_pairs.STEP_RATIO * divisor)
@@ -191,8 +187,7 @@ class Push:
         return [task for size in self.sizes for task in self.pair(runner, size, divisor)]
 
     def rates(self, run: Trajectory) -> Array:
-        """Initial rates of the slip along n by polynomials of either degree (2,), rad s-2; nan in
-        another case."""
+        """Initial rates of the slip along n by either degree (2,); nan in another case."""
         record = slice(RECORD_SKIPPED * (len(run.time) // RECORD_STEPS), None)
         # The wall carries nothing beside a ball at rest: that contact is not detected.
         alike = [self.outer, Case.RN] if self.start.name == "rest" else [self.outer]
@@ -230,8 +225,7 @@ class Push:
         tasks: Sequence[Task],
         runs: Sequence[Trajectory],
     ) -> Measurement | None:
-        """The case that follows where a slip doesn't last; None if it lasts, or runs with both
-        steps disagree."""
+        """The case that follows where slip doesn't last; None if it does, or steps differ."""
         fine = runs[1]
         ended = int(fine.case[-1])
         if ended == self.outer or any(np.any(run.case[-RECORD_SETTLED:] != ended) for run in runs):
@@ -265,15 +259,13 @@ def growth(push: Push, runs: Sequence[Trajectory]) -> Estimate | None:
 
 
 def limit_of_no_size(rates: Array) -> Array:
-    """Rates extrapolated to a slip of size zero, from rows (2 or 3, n) for sizes that halve from
-    row to row."""
+    """Rates extrapolated to no slip, from rows (2 or 3, n) for sizes that halve."""
     *first, before, last = rates
     return np.asarray((first[0] - 6 * before + 8 * last) / 3 if first else 2 * last - before)
 
 
 def _pushes(name: str, p: Parameters, more: int) -> Iterator[list[Push]]:
-    """Pushes out of every state of a set; two of them where one contact alone slips, to either
-    side."""
+    """Pushes out of states of a set; two where one contact alone slips, to either side."""
     rng = np.random.default_rng([61, *name.encode()])
     slow = 0.4 / time_unit(p) * min(1.0, math.sqrt(p.mu / max(p.eta, p.j)))
     going = Start(name, p.replace(omega_0=slow), "sideways", State(omega_c=slow).stacked())
@@ -322,14 +314,12 @@ def _pushes(name: str, p: Parameters, more: int) -> Iterator[list[Push]]:
 
 
 def start_unit(p: Parameters, x: Array) -> float:
-    """The slip that the weight, and at the wall the centrifugal force, makes in the unit of time,
-    rad s-1."""
+    """The slip that weight and centrifugal force make in the unit of time, rad s-1."""
     return (p.g + p.R * float(State.of(x).omega_c) ** 2) / 2 / p.r * time_unit(p)
 
 
 def steepest(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """The direction in which slip out of NR grows the most, for every state: that of the first
-    harmonic."""
+    """The direction in which slip out of NR grows the most: of the first harmonic."""
     rough = {name: p for name, p in sets.items() if p.eta and p.c}
     why = "without friction at the wall, or drag, no direction stands out"
     yield from (Missing("steepest", name, why) for name in sets if name not in rough)
@@ -392,8 +382,7 @@ HANGING = (1.05, 1.6, 1.3)
 
 
 def bounds(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """Zero and slope of gamma along every line: from two flows, then from two more around the zero
-    that these show."""
+    """Zero and slope of gamma along every line: from two flows, then two more at the zero."""
     yield from (
         Missing("bounds", name, FRICTIONLESS) for name, p in sets.items() if not (p.mu and p.eta)
     )
@@ -466,24 +455,20 @@ class Crossing:
     """Pushes at several flows, between which gamma passes through zero."""
 
     pushes: tuple[Push, ...]
-    """At the first two flows; and others than those around the zero, where the ball can't be at
-    that."""
+    """At the first two flows; and others, where those around the zero can't be had."""
 
     @property
     def power(self) -> int:
-        """Power of omega_0 in which gamma is a line: 1 where the orbit is held, 2 where it goes
-        with the flow."""
+        """Power of omega_0 in which gamma is a line: 2 where the orbit goes with the flow."""
         return 1 if self.pushes[0].start.name == "held" else 2
 
     @property
     def is_curved(self) -> bool:
-        """Whether gamma isn't a straight line over omega_0, because drag isn't in proportion to the
-        lag."""
+        """Whether gamma isn't a straight line over omega_0, as drag isn't in the lag."""
         return self.power == 1 and self.pushes[0].start.p.drag != STOKES
 
     def around(self, gammas: Array) -> tuple[Push, ...]:
-        """Pushes at two flows around the zero of the line through the first two; none if there is
-        none ahead."""
+        """Pushes at two flows around the zero of the line through the first two, if any."""
         if len(self.pushes) > 2:
             return self.pushes[2:]
         flows = np.array([push.start.p.omega_0 for push in self.pushes])
@@ -550,8 +535,7 @@ def _growths(runner: Runner, rows: Sequence[Sequence[Push]]) -> list[Growths]:
 
 
 def _lines_from_rolling(name: str, p: Parameters) -> Iterator[Crossing]:
-    """Pushes out of rolling at both points at flows along a line, scaled by friction and inertia,
-    for every bound."""
+    """Pushes out of RR at flows along a line, scaled by friction and inertia, by bound."""
     unit = time_unit(p)
     slow = 0.5 / unit * min(1.0, math.sqrt(p.mu / max(p.eta, p.j)))
     rubbing, spinning = math.sqrt(p.mu) / unit, math.sqrt(1 / p.j) / unit
@@ -580,8 +564,7 @@ ARROWS: dict[tuple[Case, Case], tuple[float, float, float]] = {
     (Case.SR, Case.NR): (-0.6, 0.0, 0.0),
     (Case.SS, Case.NS): (0.3, 0.1, 0.8),
 }
-"""Slips at the beginning in units of sqrt(g R)/r; that of a rolling wall contact in units of R/r
-omega_c."""
+"""Slips at first in units of sqrt(g R)/r; of a rolling wall contact in R/r omega_c."""
 
 
 LEAD = 1.5
@@ -601,8 +584,7 @@ LIFT_DEGREES = (3, 2)
 
 
 def lift(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """omega_c at which the ball leaves the floor, along every arrow; or that it doesn't at the
-    fastest orbit."""
+    """omega_c at which the ball leaves the floor, along every arrow; or that it doesn't."""
     arrows = [Arrow(runner, name, p, *arrow) for name, p in sets.items() for arrow in ARROWS]
     orbits = [
         [arrow.task(Omega / time_unit(arrow.p)) for Omega in FIRST_ORBITS] for arrow in arrows
@@ -665,14 +647,12 @@ class Arrow:
         )
 
     def task(self, omega_c: float, times: int = 1) -> Task:
-        """A short run from the orbit at omega_c, with steps half as long as those of `STEP_RATIO`,
-        divided by `times`."""
+        """A short run from an orbit, with half of `STEP_RATIO`'s steps, divided by `times`."""
         step = coarse_step(self.p) / (2 * STEP_RATIO * times)
         return self.runner.task(*self.start(omega_c), LIFT_STEPS * step, step, samples=LIFT_STEPS)
 
     def staying(self, runs: Sequence[Trajectory]) -> Sequence[Trajectory]:
-        """The first runs in succession, in the order of their orbits, that stay in the two cases of
-        the arrow."""
+        """The first runs in succession that stay in the two cases of the arrow."""
         strays = [
             not np.isin(run.case[LIFT_SKIPPED:], [self.inner, self.outer]).all() for run in runs
         ]
@@ -705,8 +685,7 @@ class Arrow:
 
 
 def _force(run: Trajectory) -> Estimate | None:
-    """Force of the floor at the beginning divided by the weight; None where it doesn't press for
-    long enough."""
+    """Force of the floor at first in weights; None where it doesn't press for long."""
     p, force = run.header.parameters, run.force_A[LIFT_SKIPPED:, 1]
     pressed = int(np.argmax(np.append(force <= 0, True)))
     if pressed < FEWEST_PRESSED:
@@ -721,8 +700,7 @@ def _force(run: Trajectory) -> Estimate | None:
 
 
 def _load(runs: Sequence[Trajectory]) -> Estimate | None:
-    """Force of the floor in N at the beginning of runs with both steps; None if it doesn't
-    press."""
+    """Force of the floor, N, at first, from both steps; None if it doesn't press."""
     p, coarse, fine = runs[0].header.parameters, *map(_force, runs)
     if coarse is None or fine is None:
         return None
@@ -732,8 +710,7 @@ def _load(runs: Sequence[Trajectory]) -> Estimate | None:
 
 
 def _onset(runs: Sequence[Trajectory]) -> Estimate | None:
-    """omega_c at which the floor's force is zero, from runs with both steps; None if it doesn't
-    fall smoothly."""
+    """omega_c at which the floor's force is zero, from both steps; None without one."""
     squares, forces = np.array([run.omega_c[0] ** 2 for run in runs[::2]]), []
     for coarse, fine in zip(map(_force, runs[::2]), map(_force, runs[1::2]), strict=True):
         if coarse is None or fine is None:

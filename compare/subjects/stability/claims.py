@@ -1,5 +1,4 @@
-"""How disturbances of the stationary states die out, or grow: the eigenvalues of Propositions
-1-6."""
+"""How disturbances of stationary states die out or grow: eigenvalues of Props. 1-6."""
 
 from __future__ import annotations
 
@@ -23,8 +22,7 @@ _LEANING = "analytic.leaning_modes"
 
 
 def _stationary(m: Measurement) -> StationarySolution:
-    """The stationary state of a case; LookupError if theory has none, or no stable one. SR may be
-    unstable."""
+    """The stationary state of a case, SR also unstable; LookupError without one."""
     p, case = m.parameters, m.case()
     found = theory(analytic.stationary_solutions, p)
     those = [s for s in found if s.exists and s.case is case and (s.stable or case is Case.SR)]
@@ -36,8 +34,7 @@ def _stationary(m: Measurement) -> StationarySolution:
 
 
 def _spectrum(m: Measurement) -> tuple[complex, ...]:
-    """The eigenvalues of the stationary state, rad s-1; in NS y is cyclic, (48), which adds a
-    zero."""
+    """The eigenvalues of the stationary state, rad s-1; in NS y is cyclic (48): a zero."""
     state = _stationary(m)
     return (
         *([0.0] if state.case is Case.NS else []),
@@ -46,8 +43,7 @@ def _spectrum(m: Measurement) -> tuple[complex, ...]:
 
 
 def _mode(m: Measurement) -> complex:
-    """The eigenvalue of theory for a measured mode, by its number in the order of frequency and
-    decay, rad s-1."""
+    """The eigenvalue of theory for a mode, by its number in the order of frequency."""
     values = _spectrum(m)
     real = 1e-9 * max(map(abs, values))  # round-off in the imaginary part of one that is real
     upper = sorted((v.imag if v.imag > real else 0.0, -v.real) for v in values if v.imag >= -real)
@@ -65,8 +61,7 @@ def _mode_size(m: Measurement) -> float:
 
 
 def _response(m: Measurement) -> float:
-    """How a linear motion follows a push, in natural units: by the exact Jacobian; of SR by its
-    leaning modes."""
+    """How a linear motion follows a push, in natural units; of SR by its leaning modes."""
     p, case, time = m.parameters, (stationary := _stationary(m)).case, m.at("time")
     names = TRAITS[case].active
     i, j = (names.index(m.text(name)) for name in ("of", "pushed"))

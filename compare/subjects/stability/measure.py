@@ -56,8 +56,7 @@ USUAL_PUSH = 2e-4
 """Size of a push that isn't extrapolated to zero, under Stokes' law of drag. The run with the
 coarser step has half of it, and shows that it doesn't matter."""
 SLIGHT_PUSH = 2e-6
-"""The same under other laws of drag: theirs is in proportion to a lag only far below a Reynolds
-number of 1."""
+"""The same under other laws: in proportion to a lag only far below Re = 1."""
 SLOWEST_SLIP = 0.04
 """Least slip speed of a state divided by sqrt(g R): a push is to be small beside it."""
 ZERO_RATE = 0.05
@@ -127,27 +126,23 @@ class Pushed:
 
     @property
     def record(self) -> tuple[int, int]:
-        """Length of a run after a push, in coarse steps, and its samples; short for RS, which a
-        large push changes."""
+        """Length of a run after a push, in coarse steps, and samples; short for RS."""
         return (2, 16) if self.case is Case.RS else PUSH_RECORD
 
     @property
     def order(self) -> int:
-        """The power of the push's size with which its error shrinks: 2 where pushes up and down are
-        subtracted."""
+        """The power of the push's size in its error: 2 where up and down are subtracted."""
         return 1 if self.case is Case.SR else 2
 
     @property
     def sizes(self) -> tuple[float, ...]:
-        """Sizes of the pushes: the first with the coarser step, the others with the finer one, the
-        largest first."""
+        """Sizes of the pushes: the first with the coarser step, then the largest first."""
         size = PUSH.get(self.case, USUAL_PUSH if self.start.p.drag == STOKES else SLIGHT_PUSH)
         return (size / 2, size, size / 2) if self.case in PUSH else (size / 2, size)
 
     @property
     def noise(self) -> float:
-        """What the accuracy to which forces are solved makes of a response; more where slip is
-        fast."""
+        """What the accuracy of forces makes of a response; more where slip is fast."""
         slip = np.abs(self.start.x0 / state_units(self.start.p))[SLIP_XYZ].max()
         return SOLVED * max(1.0, float(slip)) / max(self.sizes)
 
@@ -353,8 +348,7 @@ Row = Callable[..., Measurement]
 
 
 def _modes(state: Pushed, modes: Spectrum, step: float, row: Row) -> Measured:
-    """Measurements of decay rate and frequency of each mode, slowest first, one of each pair of
-    conjugates."""
+    """Measurements of decay rate and frequency of each mode, one of each pair."""
     p, parts, exponents = state.start.p, [], modes.exponents
     order = np.lexsort((-exponents.real, exponents.imag))
     for mode, k in enumerate((k for k in order if exponents[k].imag >= 0), start=1):

@@ -1,5 +1,4 @@
-"""Stationary states: Propositions 1-6 with their forces, and the bifurcation diagrams of Figs.
-9-11."""
+"""Stationary states: Propositions 1-6 with their forces, and the diagrams of Figs. 9-11."""
 
 from __future__ import annotations
 
@@ -77,8 +76,7 @@ def _value_criteria(
     of: Case | None = None,
     protocol: str = "settled",
 ) -> tuple[Criterion, ...]:
-    """Criteria on values of settled states: predicted in the case `of`, or in the one that was
-    detected."""
+    """Criteria on values of settled states, in the case `of`, or in that detected."""
 
     def predict(m: Measurement) -> float:
         state = theory(analytic.solution, m.parameters, of) if of else solution_of(m)
@@ -93,15 +91,13 @@ def _case_criterion(when: When) -> Criterion:
 
 
 def _rolling_criterion(when: When = lambda m: True) -> Criterion:
-    """A criterion on the case of balls that start with the fluid: RR up to the threshold at which
-    rolling ends."""
+    """A criterion on balls that start with the fluid: RR up to its threshold."""
     chosen = all_of(given(start="with the fluid"), when)
     return Criterion("settled", "case", rolling, when=chosen, by="analytic.thresholds")
 
 
 def _sinks_at_reynolds(m: Measurement) -> float:
-    """v_y in m/s by Schiller and Naumann's C_D at the Reynolds number of the measured speed
-    (`model.drag`)."""
+    """v_y in m/s by Schiller and Naumann's C_D at Re of the measured speed."""
     p, Re = m.parameters, drag.reynolds(abs(m.value), m.parameters)
     more = max(1 + drag.WAKE * Re**drag.EXPONENT, drag.BLUNT * Re / 24)
     return float(-(p.g - p.eta * p.R * p.omega_0**2) / (p.c * more))
@@ -133,8 +129,7 @@ _LASTING = {
     Exists.NR: {Case.NR},
     Exists.NS: {Case.NS},
 }
-"""What a ball can settle in where a state exists, SR counted as NR: itself, or both that it
-divides."""
+"""What a ball can settle in where a state exists, SR counted as NR: one, or both."""
 
 
 def _cases_in_region(m: Measurement) -> float:
@@ -145,16 +140,14 @@ def _cases_in_region(m: Measurement) -> float:
 
 
 def _omega_c_beyond_fold(m: Measurement) -> float:
-    """omega_c of the unstable SS; LookupError where the region lacks it, or one of the attractors
-    that it divides."""
+    """omega_c of the unstable SS; LookupError without it, or what it divides."""
     if Exists.SS | Exists.SS_BEYOND_FOLD | Exists.NR not in _region(m):
         raise LookupError("the region lacks SS, SS beyond the fold, or NR")
     return float(theory(analytic.solution, m.parameters, Case.SS, stable=False).state.omega_c)
 
 
 def _decay_leaning(m: Measurement) -> float:
-    """The slowest of what decays in a ball that leans on the floor, s-1; LookupError where the
-    region lacks SR."""
+    """The slowest decay of a ball that leans on the floor, s-1; LookupError without SR."""
     if Exists.SR not in _region(m):
         raise LookupError("the region lacks SR")
     decays = -theory(analytic.leaning_modes, m.parameters)[0].real

@@ -80,8 +80,7 @@ class Attractor:
 
 
 def _why_drag_fades(state: SteadyState) -> str:
-    """Why drag fades as the ball settles; empty if it doesn't, and a round lasts for ten times 1/c
-    or more."""
+    """Why drag fades as the ball settles; empty if it doesn't, in a round of 10/c."""
     p = state.start.p
     if p.drag != QUADRATIC:
         return ""
@@ -102,8 +101,7 @@ def _why_drag_fades(state: SteadyState) -> str:
 def _values(
     runner: Runner, same: Sequence[SteadyState], fine: SteadyState, protocol: str = PROTOCOL
 ) -> Measured:
-    """Measured values of a settled state with half the step; uncertain by what step and start
-    change, too."""
+    """Values of a settled state with half the step; uncertain by step and start."""
     p = fine.start.p
     if fine.failure:
         yield _unsettled(fine, len(fine.values), protocol)

@@ -1,5 +1,4 @@
-"""Claims about the bifurcations over omega_0: Table 5, Proposition 7, and the branch that divides
-two attractors."""
+"""The bifurcations over omega_0: Table 5, Proposition 7, the branch between attractors."""
 
 from __future__ import annotations
 
@@ -21,8 +20,7 @@ from model import Case, Parameters
 
 _BY = "analytic.thresholds"
 SLIPPING = "floor force of settled slipping → 0"
-"""How omega_02 is measured where slipping at both points ends without a fold: that is a claim of
-its own."""
+"""How omega_02 is measured where slipping ends without a fold: a claim of its own."""
 
 
 def _threshold(
@@ -44,8 +42,7 @@ def _unstable_quantity(m: Measurement) -> float:
 
 
 def _greatest_flow(m: Measurement) -> float:
-    """The greatest flow along the whole branch of SS, rad s-1; LookupError if there is not one
-    maximum alone."""
+    """The greatest flow along the branch of SS, rad s-1; LookupError unless one maximum."""
     _, flows = slipping_branch.states(np.linspace(-8.0, 8.0, 4001), m.parameters)
     tops = np.flatnonzero((flows[1:-1] > flows[:-2]) & (flows[1:-1] > flows[2:])) + 1
     if len(tops) != 1:
@@ -60,8 +57,7 @@ _HOLDS: dict[str, Callable[[float, Parameters], float]] = {
         1 - float(rolling_forces.least_utilisation(omega, p, omega).utilisation)
     ),
 }
-"""Functions that change sign where the contacts can no longer hold a ball that rolls with the
-fluid."""
+"""What changes sign where contacts can no longer hold a ball that rolls with the fluid."""
 
 
 def _end_of_rolling(name: str, p: Parameters) -> float:

@@ -45,8 +45,7 @@ TINTS = {
 
 
 def select_plane(evidence: Evidence, figure: str) -> Diagram:
-    """The plane of the measured points of a figure, "fig-7" or "fig-8"; of several sets the
-    first."""
+    """The plane of the points of a figure, "fig-7" or "fig-8"; of the first set."""
     checks = evidence.checks.get(figure, ())
     chosen = tuple(c for c in checks if c.measurement.set == checks[0].measurement.set)
     return Diagram(figure, chosen[0].measurement.parameters if chosen else _THEORY, checks=chosen)
@@ -100,8 +99,7 @@ def draw_plane(plane: Diagram) -> tuple[Figure, str]:
 
 
 def regions(axes: Axes, p: Parameters, equal: bool, highest: float = 0.0) -> None:
-    """Draw which cases exist over friction and flow, up to a flow at least, rad s-1, and the
-    thresholds."""
+    """Draw which cases exist over friction and flow, to a flow at least, and thresholds."""
     eta = np.linspace(0.0, _WIDEST, 801)
     mu = eta if equal else np.full(eta.shape, p.mu)
     # lower ones set no scale
@@ -203,8 +201,7 @@ _SHOWN = {
 
 
 def draw_diagram(of: Diagram) -> tuple[Figure, str]:
-    """A bifurcation diagram, the spin on the wall over the flow, with both scales; and its
-    caption."""
+    """A bifurcation diagram, spin on the wall over flow, both scales; and its caption."""
     figure, p = style.figure(5.8, 4.1), of.p
     if of.figure != "fig-9":
         only_where(p, of.figure == "fig-10")
@@ -234,8 +231,7 @@ def draw_diagram(of: Diagram) -> tuple[Figure, str]:
 def _draw_branches(
     axes: Axes, p: Parameters, figure: str
 ) -> tuple[dict[str, float], tuple[float, float]]:
-    """Draw all branches and special points of a diagram; return thresholds to be named and the
-    flows shown, rad s-1."""
+    """Draw branches and special points; return thresholds and flows shown, rad s-1."""
     t, rolls, mark = bifurcation.thresholds(p), p.R / p.r, partial(style.mark, axes)
     guides = {name: getattr(t, name) for name in ("omega_01", "omega_02", "omega_03", "omega_04")}
 

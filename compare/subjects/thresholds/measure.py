@@ -49,8 +49,7 @@ whose friction falls short by a millionth reaches it within a run."""
 LAGS = 1e-3
 """Relative lag behind the fluid from which on a ball that has slipped may have to slip again."""
 CREEPS = 100.0
-"""Slip, in units of that, at which a ball may creep while it comes to rest jammed between floor and
-wall."""
+"""Slip, in that unit, at which a ball may creep to rest jammed between floor and wall."""
 
 
 class Passage(StrEnum):
@@ -84,8 +83,7 @@ def lifts(end: Bracket) -> bool:
 
 
 def slip(speeds: Array, run: Trajectory, share: float = 0.1) -> float:
-    """Largest of the slip speeds (n,) in the last part of a run, in units of `SLIPPING_SPEED`
-    sqrt(g R)."""
+    """Largest of slip speeds (n,) at the end, in units of `SLIPPING_SPEED` sqrt(g R)."""
     p = run.header.parameters
     return float(speeds[tail(run, share)].max() / (SLIPPING_SPEED * math.sqrt(p.g * p.R)))
 
@@ -161,13 +159,11 @@ on the wall; pressed to the floor it rolls on both again; it settles on the floo
 COARSE = 1e-2
 """Relative width of a bracket where only the neighbourhood is wanted."""
 AWAY = 0.03
-"""Relative distance from a known end of rolling, where an engine beside the one on trial looks for
-it."""
+"""Relative distance from a known end of rolling, where an engine beside looks for it."""
 DISTANCES = (0.005, 0.01, 0.02, 0.03, 0.05)
 """Relative distances of settled states from where something vanishes."""
 DISTANCES_BELOW_FOLD = (0.01, 0.02, 0.035, 0.05, 0.08, 0.11, 0.15)
-"""The same below a fold, where slip goes like the root of the distance, in parts of the range of
-slipping."""
+"""The same below a fold, in parts of the range of slipping: slip goes like the root."""
 DISTANCES_OF_NR = (0.002, 0.008, 0.02, 0.035, 0.05)
 """The same from where a ball rides the wall as slowly as it can."""
 
@@ -207,8 +203,7 @@ class Beside(Enum):
 
 
 def measure(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """The thresholds of each set: bisected between flows whose settled cases differ, and
-    extrapolated from states."""
+    """The thresholds of each set: bisected, and extrapolated from settled states."""
     sure = not runner.sampling.granted
     found = [_where_cases_change(runner, name, p, records) for name, p in sets.items()]
     _narrow(runner, found, _end_of_rolling, careful=sure)
@@ -279,8 +274,7 @@ class Findings:
     def row(
         self, quantity: str, at: Estimate | float | None, tasks: Sequence[Task], **how: str
     ) -> Measurement | Missing:
-        """The measurement of a threshold, or of a number on the set; or why the threshold was not
-        found."""
+        """The measurement of a threshold, or of a number; or why it wasn't found."""
         if at is None:
             why = (
                 f"too few states settled for {quantity} by {how['by']}, or their extrapolation "
@@ -303,8 +297,7 @@ class Findings:
         return self.row(quantity, of.place.also(unseen_slip=unseen), of.tasks, side=side, by=by)
 
     def rows_of_zero(self, kind: Beside, what: str, quantity: str, side: str, by: str) -> Measured:
-        """The measurement of a threshold at which something is zero, extrapolated from settled
-        states beside it."""
+        """The measurement of a threshold, extrapolated from settled states to a zero."""
         if kind in self.states:
             states = self.states[kind]
             place = extrapolated(states, what, extrapolated_zero)
@@ -360,8 +353,7 @@ def _end_of_rolling(each: Findings) -> Iterator[tuple[Passage, Search]]:
 
 
 def _sinking_and_slipping(each: Findings) -> Iterator[tuple[Passage, Search]]:
-    """Rough searches for the flows up to which the wall holds no ball, and up to which SS settles
-    on the floor."""
+    """Rough searches up to where the wall holds no ball, and SS settles on the floor."""
     if change := each.changes.get(Passage.NS_ENDS):
         yield each.search(Passage.NS_ENDS, change, COARSE * change.low)
     change, end = each.changes.get(Passage.SS_ENDS), each.brackets.get(Passage.RR_ENDS)
@@ -437,8 +429,7 @@ def _on_the_wall_and_back(each: Findings) -> Iterator[tuple[Passage, Search]]:
 
 
 def continued(states: Sequence[SteadyState], height: float, less: float = 0.0) -> From:
-    """A state that rides the wall at a height, continued in omega_0 from settled states, with less
-    spin."""
+    """A state that rides the wall at a height, continued in omega_0, with less spin."""
     omegas = np.array([state.start.p.omega_0 for state in states])
     fit = np.polynomial.Polynomial.fit(
         omegas, [state.values["slip_x"].value for state in states], len(omegas) - 1
@@ -480,8 +471,7 @@ def extrapolated(
     quantity: str,
     to: Callable[[Array, Sequence[Estimate]], Estimate],
 ) -> Estimate | None:
-    """The flow to which a quantity of settled states is extrapolated; None if they are too few, or
-    there is none."""
+    """The flow to which a quantity of settled states is extrapolated, or None."""
     if len(states) < POINTS:
         return None
     flows = [state.start.p.omega_0 for state in states]
@@ -511,8 +501,7 @@ def _fold(each: Findings) -> Iterator[tuple[Passage, Search]]:
 
 
 def _rows(each: Findings) -> Measured:
-    """Measurements of the end of rolling (omega_01 or omega_03), and of omega_02, the least that
-    holds a ball up."""
+    """Rows of the end of rolling (omega_01 or omega_03), and of omega_02."""
     none = "no flow that was tried, up to twice the fastest of the settled states,"
     if not (rolling := each.bracket_seen(Passage.RR_ENDS)):
         yield each.missing(f"{none} ends two-point rolling")
@@ -545,8 +534,7 @@ def _rows(each: Findings) -> Measured:
 
 
 def _rows_of_slipping(each: Findings) -> Measured:
-    """Measurements of the end of slipping at both points: at a fold, or at omega_02; and of the
-    number of folds."""
+    """Rows of the end of slipping, at a fold or at omega_02, and the number of folds."""
     if Beside.SS_LAST not in each.states:
         if (rolling := each.bracket_seen(Passage.RR_ENDS)) and not lifts(rolling):
             yield each.missing("no end of slipping at both points was found", 3)

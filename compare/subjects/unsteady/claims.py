@@ -27,8 +27,7 @@ def _gain(m: Measurement) -> complex:
 
 
 def _onset_criterion(rule: str, relation: Relation) -> Criterion:
-    """A criterion on the amplitude at which slip begins, if rolling ends by a rule of
-    `Settings.leave_rolling`."""
+    """A criterion on the onset of slip, by a rule of `Settings.leave_rolling`."""
 
     def onset(m: Measurement) -> float:
         return theory(pulsation.slip_onset, m.parameters, m.at("f"), rule)
@@ -38,8 +37,7 @@ def _onset_criterion(rule: str, relation: Relation) -> Criterion:
 
 
 def _ramp_end(m: Measurement) -> float:
-    """The flow at which a ramp ends slipping at both points by theory; LookupError if it
-    doesn't."""
+    """The flow at which a ramp ends slipping by theory; LookupError if it doesn't."""
     p, rate = m.parameters, m.at("rate")
     # The ramp goes on three times as far beyond the fold as a slow one overshoots it.
     beyond = analytic.thresholds(p).omega_04 + 3.0 * response.ramp_coefficient(p) * rate ** (2 / 3)

@@ -1,5 +1,4 @@
-"""Unsteady flow: how the ball follows a pulsation and when it slips, jumps of the flow, ramps past
-the fold."""
+"""Unsteady flow: pulsation and when the ball slips, jumps of the flow, ramps past the fold."""
 
 from __future__ import annotations
 
@@ -26,13 +25,11 @@ _LASTS = 4.0, 56.0
 FREQUENCIES = 22
 """Frequencies for which theory computes the onset of slip and the mean error."""
 SHARES = 0.2, 0.4, RAMP[0]
-"""Flows about which the jumps of a ball that slips are shown, as parts of the way from omega_01 to
-where it ends."""
+"""Flows of the jumps shown of a ball that slips, as parts of the way to where that ends."""
 
 
 def _ends_of_slipping(p: Parameters) -> tuple[float, float]:
-    """The flows between which balls slip at both points, rad s-1; nan where the wall's friction is
-    too great."""
+    """The flows between which balls slip at both points, rad s-1; nan without such."""
     t = bifurcation.thresholds(p)
     return t.omega_01, t.omega_02 if math.isnan(t.omega_04) else t.omega_04
 
@@ -63,8 +60,7 @@ def _theory(p: Parameters) -> tuple[list[float], list[float], list[float]]:
 
 
 def draw_pulsation(of: Diagram) -> tuple[Figure, str]:
-    """A figure of pulsations: gain, phase, onset of slip and mean error over frequency; and its
-    caption."""
+    """A figure of pulsations: gain, phase, onset of slip, mean error; and its caption."""
     if not 0 < stable_ends(of.p)[0] < math.inf:
         raise GapError("there is no flow at which two-point rolling ends")
     p = _rolling(of)

@@ -129,8 +129,7 @@ def pulsation(runner: Runner, sets: Sets, records: Records) -> Measured:
 
 
 def _strong(name: str, p: Parameters, records: Records) -> Iterator[tuple[Pulsation, float]]:
-    """Pulsations by several times the mean flow of a set, under Stokes' law, and their
-    amplitudes."""
+    """Pulsations by several times the mean flow, under Stokes' law, and amplitudes."""
     end = _threshold(records, name, "omega_01")
     if end is not None and p.drag == STOKES:
         frequency = _lowest(p) * 2.0**OCTAVE
@@ -182,8 +181,7 @@ class Pulsation:
     def task(
         self, runner: Runner, amplitude: float, x: Array, timing: Timing, largest: float = 0.0
     ) -> Task:
-        """A run from a state, with as many steps in a period, a power of two, as the `largest`
-        amplitude needs."""
+        """A run from a state; steps in a period, a power of two, suit the `largest` amplitude."""
         fastest = 4 * (self.p.omega_0 + max(amplitude, largest)) / self.frequency
         least = max(
             runner.sampling.pulsation_steps, 1 / (self.frequency * coarse_step(self.p)), fastest
@@ -227,8 +225,7 @@ def _onset(runner: Runner, each: Pulsation, bracket: Bracket) -> Measurement | M
 
 
 class Round(NamedTuple):
-    """A run in a pulsation, and the limit of omega_c as its periods begin, from which the next one
-    starts."""
+    """A run in a pulsation, and the limit of omega_c as its periods begin."""
 
     task: Task
     run: Trajectory
@@ -302,8 +299,7 @@ def _as_followed(runner: Runner, pulsations: Sequence[Pulsation]) -> list[Pulsat
 
 
 def _raised(runner: Runner, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
-    """Pulsations of the largest of rising amplitudes at which the ball still rolls, if drag isn't
-    Stokes'."""
+    """Pulsations of the largest amplitudes at which the ball rolls, unless Stokes'."""
     raised = list(pulsations)
     todo = [k for k, each in enumerate(pulsations) if each.p.drag != STOKES]
     for _ in range(12):
@@ -327,8 +323,7 @@ def _raised(runner: Runner, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
 
 
 def _search(runner: Runner, each: Pulsation) -> Search:
-    """A search for the amplitude at which slip begins, in runs of a period and a half without the
-    first sixth."""
+    """A search for the amplitude at which slip begins, in runs of a period and a half."""
 
     def task(amplitude: float, bracket: Bracket, attempt: Attempt) -> Task:
         timing = Timing(1.5 * attempt.time, runner.sampling.pulsation_samples, 2 * attempt.divisor)
@@ -346,8 +341,7 @@ def _search(runner: Runner, each: Pulsation) -> Search:
 
 
 def rolls_on(run: Trajectory) -> bool:
-    """Whether after the first sixth the ball nowhere slips at both points or leaves the floor for
-    `lasting` samples."""
+    """Whether after a sixth slip at both points, or flight, never lasts: `LASTING`."""
     gone = np.isin(
         run.case[run.time > run.time[-1] / 6],
         [Case.SS, *(case for case in Case if case.A is Contact.N)],
@@ -409,16 +403,14 @@ def _slips(cases: npt.NDArray[np.int8]) -> str:
 
 
 def _threshold(records: Records, set: str, threshold: str) -> float | None:
-    """The flow (rad s-1) that the protocol `thresholds` measured as this threshold of a set, or
-    None."""
+    """The flow, rad s-1, measured as this threshold of a set, or None."""
     return next(
         (m.value for m in records.select("thresholds", threshold, lambda m: m.set == set)), None
     )
 
 
 def jumps(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """Delay, peak and height after a jump, from rolling and from settled slipping; the flow at
-    which a ramp ends it."""
+    """Delay, peak and height after jumps, rolling and slipping; where a ramp ends slip."""
     # where slipping begins, the wall carries the ball, a jump ends
     flows: dict[str, tuple[float, float, float]] = {}
     # from rest, to settle slipping before a jump or a ramp
@@ -485,8 +477,7 @@ def jumps(runner: Runner, sets: Sets, records: Records) -> Measured:
 
 
 def _jump(runner: Runner, start: Start, size: float) -> StepPair:
-    """The pair of jumps of the flow up and down, rad s-1, from a state in the case that the start
-    is named by."""
+    """The pair of jumps of the flow up and down, rad s-1, from a state in a case."""
     p, t_end = start.p, rounded_duration(start.p, runner.sampling.unsteady_lasts)
     sides = tuple(p.replace(omega_0=p.omega_0 + side * size) for side in (1, -1))
     # drag may be weak, and peaks come soon
@@ -508,8 +499,7 @@ def _jump(runner: Runner, start: Start, size: float) -> StepPair:
 
 
 def _ramps(runner: Runner, start: Start, begins: float, ends: float) -> Iterator[StepPair]:
-    """Step pairs of ramps of the flow at several rates, rad s-2, from settled SS, which is between
-    two flows."""
+    """Step pairs of ramps of the flow between two flows, from settled SS."""
     p, span = start.p, ends - begins
     last = begins + RAMP[1] * span
     for rate in runner.sampling.unsteady_rates:
@@ -522,15 +512,13 @@ def _ramps(runner: Runner, start: Start, begins: float, ends: float) -> Iterator
 
 
 def odd_part(up: Trajectory, down: Trajectory) -> Array:
-    """The part of omega_c (n,) that has the sign of the jump, relative to its last value: from 0 to
-    1."""
+    """The part of omega_c (n,) with the sign of the jump: from 0 to 1."""
     odd = up.omega_c - down.omega_c
     return np.asarray(odd / odd[-1])
 
 
 def _jump_quantities(up: Trajectory, down: Trajectory) -> dict[str, Estimate]:
-    """The delay; time and height of the highest peak, nan where there is none in the first half of
-    the runs."""
+    """The delay; time and height of the highest peak, nan without one."""
     t, y = up.time, odd_part(up, down)
     # Forces act in the middle of a step: times are known to half a finer step.
     late = coarse_step(up.header.parameters) / 4 / math.sqrt(12)
@@ -548,8 +536,7 @@ def _jump_quantities(up: Trajectory, down: Trajectory) -> dict[str, Estimate]:
 
 
 def caught_up(run: Trajectory) -> float:
-    """The flow in rad s-1 at which the lag has fallen to half of what it was at first; nan if it
-    never does."""
+    """The flow, rad s-1, at which the lag has fallen to half; nan if it never does."""
     lag = run.header.flow(run.time) - run.omega_c
     below = np.flatnonzero(lag < lag[0] / 2)
     if not len(below):
