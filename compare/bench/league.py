@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _OWN = "compare.adapters"
 ENTRIES: dict[str, str] = {
     "mujoco": f"{_OWN}.mujoco_free:best",
-    "mujoco-plain": "compare.bench.native:on_joints",
+    "mujoco-plain": "compare.bench.joints:on_joints",
     "mujoco-defaults": f"{_OWN}.mujoco_free:defaults",
     "siconos": f"{_OWN}.siconos:best",
     **{

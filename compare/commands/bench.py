@@ -27,26 +27,16 @@ LEAGUE_JSON, LEAGUE_PAGE = "league.json", "league.html"
 
 def run_league(args: argparse.Namespace) -> int:
     """Run engines on the exact cases, show the table, write JSON and page."""
-    from compare.bench import (
-        league,
-        native,
-        runner,
-    )  # here and below, because a list of the cases waits for no engine
+    # here and below, because a list of the cases waits for no engine
+    from compare.bench import league, runner
     from compare.kit import progress
     from compare.kit.pictures import embedded, svg
 
-    usual = [
-        name
-        for name in league.ENTRIES
-        if not args.settings or re.match(r"mujoco(-plain|-defaults)?$", name)
-    ]
-    chosen: dict[str, Any] = {name: league.ENTRIES.get(name, name) for name in args.engine or usual}
+    chosen = {name: league.ENTRIES.get(name, name) for name in args.engine or league.ENTRIES}
     modules = {
         name for name in chosen if re.search(r"\w[.:]\w", name) or Path(f"{name}.py").exists()
     }
     check_names(chosen.keys() - modules, list(league.ENTRIES), "engine")
-    if args.settings:
-        chosen = {args.settings.stem: native.entry(args.settings)} | chosen
     for name in args.engine or ():
         runner.check(chosen[name])
     make_directory(args.output)

@@ -36,8 +36,7 @@ def program() -> NoReturn:
     os.environ["MPLBACKEND"] = (
         "agg"  # figures go into files: that of a notebook would be looked for here, too
     )
-    if "--view" not in sys.argv:
-        os.environ["MUJOCO_GL"] = "disable"  # nothing else draws with OpenGL
+    os.environ["MUJOCO_GL"] = "disable"  # nothing draws with OpenGL
     with signals.on_first_signal(signals.end):
         try:
             code = main()

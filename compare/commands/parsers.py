@@ -128,7 +128,7 @@ def predict(parser: Parser) -> None:
 
 @command("the ball", "simulate.run", "--omega-0 25 -o run.h5")
 def simulate(parser: Parser) -> None:
-    """One run with any engine, into a file, or live in MuJoCo's viewer."""
+    """One run with any engine, into a file."""
     options.add_engine(parser)
     options.add_parameters(parser)
     group = parser.add_argument_group(
@@ -152,15 +152,8 @@ def simulate(parser: Parser) -> None:
     options.add_samples(parser)
     written = "file to write: HDF5, or the samples as CSV"
     parser.add_argument("-o", "--output", type=DATA, help=f"{written} (default: none)")
-    live = "show the ball in MuJoCo's viewer until that is closed; no --time, and nothing is kept"
-    parser.add_argument("--view", action="store_true", help=live)
-    parser.add_argument(
-        "--speed", type=options.speed, help="speed of --view (default 1, real time)"
-    )
     options.add_json(parser, "print the description as JSON")
     parser.needs("--longest-interval", "--flow")
-    parser.needs("--speed", "--view")
-    parser.excludes("--view", "--json", "--output", "--sample-interval", "--time")
 
 
 @command("the ball", "look.inspect", "run.h5 --plot run.png")
@@ -410,40 +403,12 @@ def league(parser: Parser) -> None:
         "newton-semiimplicit-defaults, newton-vbd-defaults"
     )
     parser.add_argument("--engine", action="append", metavar="NAME", help=named)
-    mine = (
-        "MuJoCo with the options of an MJCF file and the contacts of its ball, too; beside it "
-        "MuJoCo alone"
-    )
-    parser.add_argument("--settings", type=Path, metavar="FILE.xml", help=mine)
     options.add_processes(parser)
     options.add_directory(parser, "results")
     options.add_json(parser)
 
 
 COMMANDS = {name: each for group in GROUPS.values() for name, each in group.items()}
-MOVED = {
-    "compare -o": "--plot",
-    "compare --output": "--plot",
-    "attractors --page": "-o",
-    "attractors --starts": "--random",
-    "basins --save": "-o",
-    "basins --plot": "-o",
-    "sweep --hold": "--time",
-    "render --from": "--at",
-    "render --seconds": "--time",
-    "render --force-arrow": "--arrows FORCE SLIP",
-    "render --slip-arrow": "--arrows FORCE SLIP",
-}
-"""Options of earlier versions by command, and what they are called now."""
-GONE = {
-    "report": "'dualball judge' writes report.html anew, too",
-    "search": "it is 'python -m docs.studies.search' in a clone",
-    "view": "'dualball simulate --view' opens the viewer, 'dualball explore' a page with the "
-    "motion in 3-D",
-    "grade": "'dualball league --settings FILE.xml' puts settings on the exact cases, 'dualball "
-    "forecast' any model",
-}
-"""Commands of earlier versions, and what to use now."""
 
 
 def declare(commands: options.Commands, name: str) -> None:
@@ -471,14 +436,9 @@ def parser(words: Sequence[str]) -> Parser:
     )
     if words[0] == "--print-completion":
         _complete(parser, commands, words[1:])
-    for old in (f"{words[0]} {word.partition('=')[0]}" for word in words):
-        if old in MOVED:
-            raise InputError(f"{old} is {MOVED[old]} now")
     if words[0] in COMMANDS:
         declare(commands, words[0])
         return parser
-    if words[0] in GONE:
-        raise InputError(f"there is no command {words[0]!r} any more: {GONE[words[0]]}")
     if not words[0].startswith("-"):
         raise InputError(
             f"there is no command {words[0]!r}{suggestion(words[0], COMMANDS)}; see 'dualball "

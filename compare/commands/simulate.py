@@ -14,7 +14,6 @@ from compare.commands import options, running, signals
 from compare.kit import collection, steady, sweep
 from compare.kit.tasks import failed_path, store
 from compare.view import motions
-from mjsim.contact_settings import ContactModel
 from model import Flow, InputError, storage, table
 from model.files import reading_json, write_text
 
@@ -37,19 +36,8 @@ _TOLD_APART = (
 
 
 def run(args: argparse.Namespace) -> int:
-    """Simulate one run, store it as far as it came, and describe it; or let MuJoCo's viewer show
-    it."""
+    """Simulate one run, store it as far as it came, and describe it."""
     p, flow = options.parameters(args), running.flow(args)
-    if args.view:
-        from compare.view import viewer  # here, because nothing else needs it
-
-        settings = running.settings(args, p)
-        if not isinstance(settings, ContactModel):
-            raise InputError(f"--view shows MuJoCo, not {args.engine.name}")
-        viewer.view(
-            p, running.start(args), flow or Flow.steady(p.omega_0), settings, args.speed or 1.0
-        )
-        return 0
     args.time = args.time or DURATION
     task = running.task(args, p, flow=flow)
     # The first signal ends the run with its samples, the second without.

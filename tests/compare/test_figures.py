@@ -73,7 +73,7 @@ def test_figures_of_a_real_fluid_warn_where_the_model_does_not_hold(tmp_path, mo
         assert warning in " ".join(each.get_suptitle().split())
 
 
-@pytest.mark.parametrize("name", ["fig-9", "fig-10", "fig-11", "fig-12", "hopping-walls"])
+@pytest.mark.parametrize("name", ["fig-9", "fig-10", "fig-11", "fig-12"])
 def test_special_points_lie_on_curves(name):
     """Every black dot is the end of a curve, or on one, within a thousandth of the frame."""
     for axes in alone(name)[0].axes:

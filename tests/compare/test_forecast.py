@@ -14,12 +14,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from compare.adapters.mujoco_free import Bodies
-from compare.bench import forecast, forecast_page, native
+from compare.bench import forecast, forecast_page
 from compare.bench.settled import STILL, settle, time_to_settle
 from model import InputError
-from tests.commands import carried_out, told
-from tests.exact_cases import CASES
+from tests.commands import carried_out
 
 FLOOR = '<geom name="floor" type="plane" size="20 20 .1" {}/>'
 SPHERE, BLOCK = 'type="sphere" size=".05"', 'type="box" size=".05 .05 .05"'
@@ -543,114 +541,3 @@ def test_where_no_option_helps_coulomb_does(forecasts):
     assert "coulomb = mjsim.Coulomb(model)" in shown
     (ball,) = re.findall(r"floor / ball +(.*)", shown.partition("With mjsim.Coulomb")[2])
     assert ball.split()[:4] == ["0"] * 4  # creep and turning, predicted and found
-
-
-SMALL = '<body name="ball"><freejoint/><geom name="ball" type="sphere" size="0.01"/></body>'
-WALL = '<geom name="wall" type="box" size="0.1 1 1" pos="0.11 0 0" solref="0.03 1"/>'
-
-
-def read(tmp_path, text):
-    """Settings read from a file with this text."""
-    (tmp_path / "scene.xml").write_text(text)
-    return native.read(tmp_path / "scene.xml")
-
-
-def test_the_league_takes_the_settings_of_a_file(tmp_path, capsys, monkeypatch):
-    """A block on a slope creeps as MuJoCo comes and holds with a cone; the step is that of the
-    file."""
-    monkeypatch.setattr(
-        "compare.bench.league.cases", lambda: [CASES["block-rests"], CASES["rolls-on-both"]]
-    )
-    (tmp_path / "mine.xml").write_text(
-        mjcf(GROUND + SMALL, 'timestep="0.001" cone="elliptic" impratio="100"')
-    )
-    words = (
-        f"league --settings {tmp_path / 'mine.xml'} --engine mujoco-defaults -o {tmp_path} --json"
-    )
-    found = json.loads(told(capsys, words))["engines"]
-    assert list(found) == ["mine", "mujoco-defaults"]
-    mine, usual = (
-        {result["case"]: result for result in results}["block-rests"] for results in found.values()
-    )
-    assert mine["steps"] == [0.001]
-    assert "no wall" in mine["engine"]["note"]
-    assert mine["errors"][-1] < usual["errors"][-1] / 30
-
-
-def test_settings_come_through_to_the_engine_and_geoms_are_mixed_as_it_does(tmp_path):
-    """Against the contacts that MuJoCo itself makes."""
-    text = mjcf(
-        '<geom name="floor" type="plane" size="1 1 1" solref="0.01 0.9" solmix="3" margin="0.001"/>'
-        '<geom name="wall" type="box" size="0.1 1 1" pos="0.1095 0 0" solimp="0.5 0.6 0.01" '
-        'priority="1"/>'
-        '<body pos="0 0 0.0095"><freejoint/><geom type="sphere" size="0.01" solref="0.03 '
-        '1.1"/></body>',
-        'integrator="implicitfast" cone="elliptic" solver="CG" impratio="7" iterations="33" '
-        'tolerance="1e-5" '
-        'noslip_iterations="2"',
-    )
-    given, body = (
-        mujoco.MjModel.from_xml_string(text),
-        Bodies("mine", "", tune=read(tmp_path, text).tune),
-    )
-    data = mujoco.MjData(given)
-    mujoco.mj_forward(given, data)
-    assert data.ncon == 2
-    body.build(CASES["rolls-on-both"], 0.0015)
-    model, option = body.model, body.model.opt
-    assert (option.timestep, option.tolerance, option.noslip_iterations) == (0.0015, 1e-5, 2)
-    assert (option.impratio, option.iterations, option.cone) == (
-        7.0,
-        33,
-        mujoco.mjtCone.mjCONE_ELLIPTIC,
-    )
-    assert (option.integrator, option.solver) == (
-        mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
-        mujoco.mjtSolver.mjSOL_CG,
-    )
-    assert model.npair >= 2
-    for k, geom in enumerate(model.pair_geom1):
-        floor = model.geom(geom).name == "floor"
-        (contact,) = (
-            each for each in data.contact if (given.geom("floor").id in each.geom) == floor
-        )
-        assert model.pair_solref[k] == pytest.approx(contact.solref)
-        assert model.pair_solimp[k] == pytest.approx(contact.solimp)
-        assert model.pair_margin[k] == pytest.approx(contact.includemargin)
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (mjcf(GROUND), "there is no ball"),
-        (mjcf(SMALL), "the ball has no contacts"),
-        (mjcf(GROUND + SMALL, flag='<flag contact="disable"/>'), "the ball has no contacts"),
-        (
-            mjcf(GROUND + SMALL.replace("ball", "a") + SMALL.replace("ball", "b")),
-            "there are 2 spheres that move",
-        ),
-        (mjcf(GROUND + SMALL, 'tolerance="-1"'), "tolerance = -1 is out of range: must be >= 0"),
-    ],
-)
-def test_files_without_such_contacts(tmp_path, text, message):
-    with pytest.raises(InputError, match=message) as refused:
-        read(tmp_path, text)
-    assert "\n" not in str(refused.value)
-
-
-@pytest.mark.parametrize(
-    ("world", "lacks"),
-    [
-        *(
-            (GROUND + SMALL.replace(">", f' pos="0 0 {z}">', 1), "no wall .* floor")
-            for z in (-0.004, 0, 0.0099, 1)
-        ),
-        (WALL + SMALL, "no floor .* its wall"),
-        (GROUND + WALL + SMALL, "^$"),
-    ],
-)
-def test_what_stands_for_what_is_missing(tmp_path, world, lacks):
-    of_scene = read(tmp_path, mjcf(world))
-    assert re.search(lacks, of_scene.note)
-    assert "\n" not in of_scene.note
-    assert (of_scene.A == of_scene.B) is bool(of_scene.note)

@@ -1,4 +1,4 @@
-"""Pages, the viewer and the page to play with show the ball where it is, or say
+"""Pages, and the page to play with, show the ball where it is, or say
 why they can't."""
 
 import base64
@@ -10,7 +10,6 @@ import sys
 import urllib.error
 import urllib.request
 from pathlib import Path
-from unittest import mock
 from urllib.parse import parse_qsl
 
 import numpy as np
@@ -19,13 +18,11 @@ from PIL import Image
 
 import analytic
 import mjsim
-from compare.view import explore, geometry, page, viewer
-from mjsim import RigidContacts, recorder
-from model import Case, Flow, InputError, Parameters, State, storage
-from model.kinematics import rotated
+from compare.view import explore, geometry, page
+from model import Case, InputError, Parameters, State, storage
 from tests.commands import refused, started, told
 
-P, SETTINGS = Parameters.named("reference"), RigidContacts()
+P = Parameters.named("reference")
 
 
 @pytest.fixture(scope="module")
@@ -118,41 +115,6 @@ def test_what_cannot_be_shown(run, tmp_path, monkeypatch, name, options, message
     with pytest.raises(InputError, match=message):
         page.save(run, Path(name), **options)
     assert not list(tmp_path.iterdir())
-
-
-def viewed(monkeypatch, x0, flow, pictures, takes=1 / 64):
-    """Steps until the window closes, after so many pictures, and the ball; its clock tells how long
-    each takes, s."""
-    window = mock.MagicMock(spec=["is_running", "lock", "sync", "monotonic", "sleep"])
-    window.is_running = lambda: window.sync.call_count < pictures
-    window.monotonic = lambda: window.sync.call_count * takes
-    monkeypatch.setattr(viewer, "time", window)
-    ball = viewer.start(P, x0, flow, SETTINGS)
-    return viewer.run(window, ball, flow, SETTINGS.timestep, 1.0), ball
-
-
-def test_the_loop_is_that_of_a_simulation(monkeypatch):
-    x0, flow = [0, 0, 13.0, 0, 0, 0], Flow.ramp(20.0, 25.0, 0.3)
-    steps, ball = viewed(monkeypatch, x0, flow, 33)
-    assert (
-        steps == 500
-    )  # half a second: the first of the 33 pictures, of 1/64 s without round-off, shows the start
-    run = mjsim.simulate(P, x0, 0.5, flow, SETTINGS, sample_interval=0.5)
-    qpos, qvel = np.array(ball.data.qpos), np.array(ball.data.qvel)
-    place = (
-        qpos[:3] - SETTINGS.midpoint * SETTINGS.timestep * qvel[:3]
-    )  # positions are ahead of velocities
-    qvel[3:] = rotated(qpos[3:], qvel[3:])
-    # Equal but for the round-off of turning one state into the paper's variables, or many at once.
-    scale = np.maximum(np.abs(run.x[-1]), [P.r, 1, 1, 60, 60, 60, P.r, 1])
-    np.testing.assert_array_less(
-        np.abs(recorder.state(place, qvel, P) - run.x[-1]), 8 * np.finfo(float).eps * scale
-    )
-
-
-def test_a_slow_machine_does_not_run_after_the_clock(monkeypatch):
-    steps, _ = viewed(monkeypatch, [0, 0, 12.0, 0, 0, 0], Flow.steady(12.0), 4, takes=3.0)
-    assert steps == 3 * round(viewer.BEHIND / SETTINGS.timestep)
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from operator import methodcaller
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -26,9 +26,6 @@ from model import Case, Contact, Parameters, State
 SET = Parameters.named("hopping")
 LOWEST_FLOW, HIGHEST_FLOW = 0.9, 1.4
 """Flows shown, in units of omega_02, farther if the set's own is."""
-LEAST_WALL, MOST_WALL = 0.4, 2.0
-"""Friction of the wall that is shown, in units of the set's own."""
-_SHORT, _UNNAMED = {Bifurcation.BIRTH: "birth"}, Bifurcation.PERSISTENCE
 STARTS = 20
 """Random starts from which hops of one's own set are looked for."""
 
@@ -146,100 +143,6 @@ def draw_orbit(of: Diagram) -> tuple[Figure, str]:
     )
 
 
-class _Hop(NamedTuple):
-    """What is drawn of an orbit over the friction of the wall: the height of the hops in m, mean
-    omega_c in rad/s."""
-
-    eta: float
-    height: float
-    omega_c: float
-    stable: bool
-
-
-def _wall_branch(p: Parameters) -> tuple[list[_Hop], list[tuple[Bifurcation, _Hop]]]:
-    """The branch of hops over the friction of the wall, and what happens on it: both lie on the
-    line.
-
-    Hops of no height are none: ends of the branch are extrapolated from the last two orbits.
-    """
-
-    def hop(orbit: orbits.Orbit, eta: float) -> _Hop:
-        return _Hop(
-            eta, float(orbit.cycle.y.max()), float(State(*orbit.mean).omega_c), orbit.stable
-        )
-
-    branch = orbit_branch.follow(_orbit_or_gap(p), "eta", LEAST_WALL * p.eta, MOST_WALL * p.eta)
-    rows = [hop(orbit, orbit.p.eta) for orbit in branch.orbits]
-    places = list[tuple[Bifurcation, _Hop]]()
-    for place in branch.places:
-        if place.kind is Bifurcation.BIRTH:
-            at, (one, two) = (
-                (len(rows), rows[:-3:-1]) if place is branch.places[-1] else (0, rows[:2])
-            )
-            share = (place.value - one.eta) / (two.eta - one.eta)
-            eta, height, omega_c = (
-                a + share * (b - a) for a, b in zip(one[:3], two[:3], strict=True)
-            )
-            row = _Hop(eta, height, omega_c, one.stable)
-        else:  # where the line is bent least by it
-            row = hop(place.orbit, place.value)
-            x = np.array([(r.eta / p.eta, r.height / p.r) for r in (*rows, row)])
-            detour = np.hypot(*(x[:-1] - x[-1]).T)
-            at = 1 + int(np.argmin(detour[:-1] + detour[1:] - np.hypot(*np.diff(x[:-1], axis=0).T)))
-            row = row._replace(stable=rows[at - 1].stable)
-        if place.kind is not Bifurcation.RANGE:
-            rows.insert(at, row)
-            places.append((place.kind, row))
-    return rows, places
-
-
-def draw_walls(of: Diagram) -> tuple[Figure, str]:
-    """A figure of height and mean omega_c of hops over the friction of the wall; and its
-    caption."""
-    if of.p.eta == 0:
-        raise GapError("its wall has no friction that could grow")
-    rows, places = _wall_branch(of.p)
-    figure, panels = style.panels(9.0, 3.8, 1, 2)
-    shown = ("height", "height of the hops (mm)", 1e3), ("omega_c", "mean " + style.OMEGA_C, 1.0)
-    eta, stable = np.array([row.eta for row in rows]), np.array([row.stable for row in rows])
-    offsets = {Bifurcation.TORUS: (0, -20), Bifurcation.FOLD: (8, 4), Bifurcation.BIRTH: (-8, 5)}
-    for axes, (quantity, label, unit) in zip(panels, shown, strict=True):
-        values = unit * np.array([getattr(row, quantity) for row in rows])
-        for part, line in ((np.ones_like(stable), style.UNSTABLE), (stable, style.STABLE)):
-            axes.plot(eta, np.where(part, values, np.nan), color=style.HOPPING, ls=line, lw=2)
-        named = {_UNNAMED}
-        for kind, row in places:
-            at = row.eta, unit * getattr(row, quantity)
-            axes.plot(*at, **style.POINT)
-            if kind not in named:
-                style.beside(axes, *at, _SHORT.get(kind, str(kind)), offsets.get(kind, (8, 4)))
-            named.add(kind)
-        for m in of.states:
-            low, high = m.value - 3 * m.uncertainty, m.value + 3 * m.uncertainty
-            axes.axvspan(low, high, color="0.3", alpha=0.4, label=f"{m.engine}: hops end")
-        axes.set(xlabel="wall friction $\\eta$", ylabel=label)
-        axes.margins(0.2, 0.1)
-    style.legend(panels[0], loc="upper left")
-    mark = (
-        " Shaded: the least wall friction at which hops don't last, as measured."
-        if of.states
-        else ""
-    )
-    told = ", ".join(
-        f"{_SHORT.get(kind, kind)} η = {row.eta:.4g}"
-        for kind, row in places
-        if kind is not _UNNAMED
-    )
-    return figure, (
-        "Height and mean ω_c of the hopping ball against the friction of the wall, from "
-        f"{LEAST_WALL:g} to {MOST_WALL:g} times its own. Named along the branch: "
-        f"{told or 'nothing'}. At a birth hops have no height; at a torus bifurcation they lose "
-        "stability, in a fold the branch turns back. Dots without names: the sequence of cases "
-        f"changes. Dashed: unstable. {style.named(of.p, 'mu', 'j', 'kappa', 'omega_0')} "
-        f"rad/s.{mark}"
-    )
-
-
 _SHADES = (style.HOPPING, *(style.COLOURS[case] for case in (Case.RR, Case.SS, Case.NR, Case.NN)))
 """Of `ATTRACTORS`."""
 _VARIABLES = {
@@ -312,6 +215,5 @@ FIGURES = {
             draw_branch,
             "hopping-birth",
         ),
-        ("hopping-walls", "hops along rougher walls", "orbit_death", draw_walls, "hopping-death"),
     )
 }

@@ -305,11 +305,6 @@ FIGURES = {"characteristic": Drawing("Characteristic curves", select_curves, dra
 # ------------------------------------------------------------------------------
 
 
-_LABELS = {name: f"$\\{name}$" for name in ("mu", "eta", "rho_b", "rho_f", "nu_f")} | {
-    "gravity": "gravity"
-}
-
-
 def draw_readings(made: Design) -> tuple[Figure, str]:
     """A figure of a design: reading over flow, band and limits; and its caption."""
     curve, chosen, request = made.curve, made.choice, made.request
@@ -347,30 +342,6 @@ def draw_readings(made: Design) -> tuple[Figure, str]:
     )
 
 
-def draw_sensitivities(made: Design) -> tuple[Figure, str]:
-    """A bar chart: by how many per cent each threshold changes if a value does by one; and its
-    caption."""
-    figure, axes = style.panels(7.0, 3.6)
-    there = [key for key in THRESHOLDS if np.isfinite(getattr(made.thresholds, key))]
-    names = list(made.sensitivities[there[0]])
-    width = 0.8 / len(there)
-    for k, key in enumerate(there):
-        values = [made.sensitivities[key][name].value for name in names]
-        places = np.arange(len(names)) + (k - (len(there) - 1) / 2) * width
-        look: dict[str, Any] = {
-            "color": style.THRESHOLD_LINES[key][0],
-            "hatch": ("", "//", "..", "xx")[k],
-            "ec": "white",
-        }
-        axes.bar(places, values, width, label=style.THRESHOLD_LABELS[key], **look)
-    axes.axhline(0, color="black", lw=0.8)
-    axes.set_xticks(range(len(names)), [_LABELS.get(name, f"${name}$") for name in names])
-    axes.set_ylabel("% of the threshold per %")
-    axes.grid(axis="y", alpha=0.25)
-    style.legend(figure, loc="outside upper center", ncols=len(there))
-    return figure, "Sensitivities: by how many per cent a threshold changes if a value does by one."
-
-
 def draw_friction(made: Design) -> tuple[Figure, str]:
     """A map of the operating limit of a chosen meter over frictions; and its caption."""
     chosen = made.choice
@@ -398,5 +369,5 @@ def draw_friction(made: Design) -> tuple[Figure, str]:
     )
 
 
-OF_A_METER = draw_readings, draw_sensitivities, draw_friction
+OF_A_METER = draw_readings, draw_friction
 """The figures of a design's page."""
