@@ -53,11 +53,7 @@ def full_verdict(claim: Claim, evidence: RecordsByEngine) -> Verdict:
 
 
 def assess(
-    claim: Claim,
-    by: Engine,
-    steps: Mapping[int, Records],
-    ends: Ends,
-    trial: Sequence[Check] = (),
+    claim: Claim, by: Engine, steps: Mapping[int, Records], ends: Ends, trial: Sequence[Check] = ()
 ) -> EngineVerdict:
     """What an engine says of a claim by its measurements at each step divisor; `ends` are measured
     thresholds, `trial` the checks of the engine on trial.

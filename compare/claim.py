@@ -158,8 +158,7 @@ class Judged:
         """By quantity, the smallest relative error of theory that every conclusive check would
         notice.
 
-        That of all checks where none is conclusive.
-        """
+        That of all checks where none is conclusive."""
         power: dict[str, float] = {}
         fine = {check.measurement.quantity for check in self.checks if check.conclusive}
         for check in self.checks:

@@ -153,8 +153,7 @@ def write(
     """Write figures to a directory, and their captions; yield the name of each, and why it wasn't
     drawn if so.
 
-    Raises `InputError` for an unknown format, `StorageError` if a file can't be written.
-    """
+    Raises `InputError` for an unknown format, `StorageError` if a file can't be written."""
     for suffix in formats:
         if suffix not in FORMATS:
             raise InputError(
@@ -224,8 +223,7 @@ def drawn(new: tuple[Path, Drawing, Any]) -> dict[str, str]:
     """Draw a figure and write it to its SVG file, with its caption as description: picture and
     caption.
 
-    Where it can't be drawn or written, the reason as a "gap".
-    """
+    Where it can't be drawn or written, the reason as a "gap"."""
     path, drawing, data = new
     try:
         with at_most(JUDGING):

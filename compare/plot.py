@@ -7,8 +7,7 @@ For example:
     from model import Parameters
 
     axes = plot.characteristic(Parameters.load("mine.toml"))
-    axes.figure.savefig("mine.svg")
-"""
+    axes.figure.savefig("mine.svg")"""
 
 from __future__ import annotations
 
@@ -45,8 +44,7 @@ def characteristic(
     where unstable.
 
     Dotted: the thresholds (84) to (88). The title warns of a fluid for which the model doesn't
-    hold. Raises `InputError` where a set has none, as without drag.
-    """
+    hold. Raises `InputError` where a set has none, as without drag."""
     axes, top = _given_or_new(axes), fastest or flowmeter.top_flow(p)
     flowmeter.theory(axes, p, top)
     axes.set(xlabel=style.OMEGA_0, ylabel=style.OMEGA_C)
@@ -60,8 +58,7 @@ def regions(p: Parameters, axes: Axes | None = None, *, equal: bool = False) -> 
     and the flow.
 
     As Figs. 7 and 8 of the paper, with the other parameters of the set. The title warns as that of
-    `characteristic`.
-    """
+    `characteristic`."""
     axes = _given_or_new(axes)
     thresholds.regions(axes, p, equal)
     style.legend(axes, loc="upper right")
@@ -121,8 +118,7 @@ def basins(of: Basins | str | Path, axes: Axes | None = None) -> Axes:
     """A map of where balls end that start on a plane of states, from the file of `dualball basins`,
     or what it holds.
 
-    Raises `StorageError` for a file that isn't one.
-    """
+    Raises `StorageError` for a file that isn't one."""
     axes = _given_or_new(axes)
     attractors.fill_basins(axes, of if isinstance(of, Basins) else Basins.load(of))
     return axes

@@ -26,8 +26,7 @@ def case_of(m: Measurement) -> Case:
     """The case of the state that was measured; two cases in which a contact carries nothing count
     as one.
 
-    SR is counted as NR, with an unloaded floor, and RN as RS, with an unloaded wall.
-    """
+    SR is counted as NR, with an unloaded floor, and RN as RS, with an unloaded wall."""
     case = physical_case(m.case())
     return Case.RS if case is Case.RN else case
 

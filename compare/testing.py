@@ -240,8 +240,7 @@ def assert_tracks(
         If it does.
     InputError
         For fewer than `FEWEST` samples, a reference that ends earlier, samples too far apart
-        to be interpolated.
-    """
+        to be interpolated."""
     check_number("rms", rms, "1", POSITIVE)
     a, b = read(mine), read(reference)
     off, unit = difference(a, b, quantity), UNITS[quantity]
@@ -293,8 +292,7 @@ def assert_settles(
         quarter three of the slowest time constants must pass, or a ball that started in theory's
         state might not have left it yet. They are those of a disturbance of the state and of a ball
         that is taken along from rest, (1 + 2 j)/c with the c of its lag in the state, and no less
-        than Stokes'.
-    """
+        than Stokes'."""
     check_number("rtol", rtol, "1", POSITIVE)
     motion = read((time, omega_c))
     if isinstance(case, str) and case not in Case.__members__:

@@ -71,8 +71,7 @@ def validate(
     InputError
         For an unknown claim, sets that are no `Parameters`, or an engine that can't run here.
     StorageError
-        If the directory can't be written or holds results of another version.
-    """
+        If the directory can't be written or holds results of another version."""
     forget()
     study = plan(Path(output), level, claims, sets, engine)
     count = min(workers if isinstance(workers, int) else workers.count, os.cpu_count() or 1)
@@ -199,10 +198,7 @@ def measure(study: Study, campaign: Campaign, far: ValidationProgress) -> Iterat
 
 
 def judge(
-    claims: Sequence[Claim],
-    measured: Iterable[SoFar],
-    announce: Announce,
-    far: ValidationProgress,
+    claims: Sequence[Claim], measured: Iterable[SoFar], announce: Announce, far: ValidationProgress
 ) -> dict[str, Verdict]:
     """The verdicts by claim, each as soon as all that it needs is measured."""
     verdicts: dict[str, Verdict] = {}
@@ -302,8 +298,7 @@ def write(
     """Judge what isn't known yet, and write the summary, and the report with what is to draw
     figures, if anything.
 
-    Return the verdicts on all claims.
-    """
+    Return the verdicts on all claims."""
     verdicts = [known.get(claim.id) or full_verdict(claim, records) for claim in CLAIMS]
     summary = Summary.of(verdicts, level, files)
     if over:

@@ -14,14 +14,7 @@ from compare.adapters.free import CORNERS, Free, State, Touch
 from compare.adapters.scene import FACETS, TIME_STEPS, Scene, Vector, facing
 from model.arrays import Array
 
-FEATURES = (
-    "two bodies",
-    "moving surface",
-    "dry joint",
-    "tripod",
-    "disc",
-    "anisotropic friction",
-)
+FEATURES = ("two bodies", "moving surface", "dry joint", "tripod", "disc", "anisotropic friction")
 _HEAVY = 1e6
 """Mass of a wall that moves divided by that of the body, which it doesn't feel."""
 _SOLIMP = 0.999

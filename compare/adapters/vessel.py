@@ -100,8 +100,7 @@ def simulate(
     ------
     InputError
         If the library is not installed, an argument out of range, or the time step too large
-        for the problem.
-    """
+        for the problem."""
     p, flow, t_end, h = task.parameters, task.fluid, task.t_end, task.settings.timestep
     every, count = sampling(t_end, h, task.sample_interval)
     x = State.one(task.x0)
@@ -124,10 +123,7 @@ def simulate(
                 if steps.done % NOTED == 0 and steps.done < total:
                     steps.tell(last=False)
                     progress(steps.done / total)
-        except (
-            RuntimeError,
-            InterruptedError,
-        ) as error:
+        except (RuntimeError, InterruptedError) as error:
             # what engines raise where they can't go on
             known = isinstance(error, (BreakdownError, InterruptedError))
             said = f"{error}" if known else f"could not go on ({' '.join(str(error).split())[:80]})"

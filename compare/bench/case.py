@@ -167,8 +167,7 @@ def read(path: Path) -> ContactCase:
     StorageError
         If the file can't be read, or lacks something.
     InputError
-        If it is of another schema or version.
-    """
+        If it is of another schema or version."""
     with reading_json(path, "exact case") as data:
         if (schema := data["schema"]) != "dualball-case":
             raise InputError(

@@ -309,8 +309,7 @@ def _descends(t: Array, angle: float, lever: float = 2 * J, mu: float = 9.0) -> 
     """A body goes down a groove at g sin/(1 + j/sin^2 45) if it rolls, faster if it slips; a block
     can't roll.
 
-    Each plane of the groove carries m g cos/sqrt(2).
-    """
+    Each plane of the groove carries m g cos/sqrt(2)."""
     way, normal = slope(angle)
     a = max(G * math.sin(angle) / (1 + lever),
             G * (math.sin(angle) - mu * math.cos(angle) / math.sqrt(0.5)))

@@ -160,8 +160,7 @@ def follow_advice(
 
     The second forecast is that after the change, the third that with the remedy on top.
     What isn't advised isn't tried: None. The change is made in `model`. `tell` is called with the
-    fraction done. Raises as `forecast` does.
-    """
+    fraction done. Raises as `forecast` does."""
     after = held = None
     if change := before.change:
         advice.apply(model, change.option, change.value)

@@ -130,8 +130,7 @@ def _dragged(t: Array, above: float = _ABOVE, below: float = _BELOW, load: float
     """A block that slides on a plank slows by mu g and draws the plank until both go together, then
     stop.
 
-    `load` is what of the block's weight the floor bears under the plank.
-    """
+    `load` is what of the block's weight the floor bears under the plank."""
     a = max(above * G - below * (_HEAVIER + load) * G, 0.0) / _HEAVIER
     meet = _SPEED / (above * G + a)
     common, brake = a * meet, below * G

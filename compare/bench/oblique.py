@@ -17,18 +17,7 @@ import numpy as np
 
 from compare.adapters.scene import Surface
 from compare.bench.case import ContactCase
-from compare.bench.closed_forms import (
-    BLOCK,
-    MU,
-    RADIUS,
-    SPEED_ALONE,
-    UP,
-    G,
-    J,
-    block,
-    case,
-    sphere,
-)
+from compare.bench.closed_forms import BLOCK, MU, RADIUS, SPEED_ALONE, UP, G, J, block, case, sphere
 from compare.bench.mechanisms import BALANCE, TRIPOD, WRONG_TRIPODS, integrated, tripod
 from model.arrays import Array
 

@@ -15,8 +15,7 @@ is not asked for cases that need what version 1 of them had not (`ContactCase.ne
 ``DECLARED`` (in words, all that isn't a free body in plain geometry under the engine's own
 settings), ``NOTE`` (what is worst and why, in a sentence), ``TIMESTEPS`` (its own instead of
 `TIME_STEPS`), ``KNOWN`` (package and version with which it is known to work, ``"mujoco 4.0.0"``),
-``MISSING`` (why it can't be used here).
-"""
+``MISSING`` (why it can't be used here)."""
 
 from __future__ import annotations
 
@@ -308,8 +307,7 @@ def serve_engine(handle: int) -> None:
     """Run in the process of an engine: receive the engine, then cases; send the states that it
     makes of each.
 
-    It ends with the process that started it.
-    """
+    It ends with the process that started it."""
 
     def end_with_parent() -> None:
         sys.stdin.read()

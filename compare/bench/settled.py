@@ -106,8 +106,7 @@ def _check_sizes(spec: Any) -> None:
 def set_controls(model: Any, data: Any, values: Sequence[str]) -> None:
     """Set controls: a number for each actuator, or NAME=NUMBER for some.
 
-    Raises `InputError` for a name or a number that the model does not allow.
-    """
+    Raises `InputError` for a name or a number that the model does not allow."""
     names = [model.actuator(k).name or str(k) for k in range(model.nu)]
     given = [
         (name, text) if equals else ("", name)
@@ -169,8 +168,7 @@ def settle(
     """Advance until velocities no longer change, for at most `limit` s; nothing sleeps meanwhile.
 
     `law` steps in the place of `mj_step`; `tell` is called with the fraction done, about. Raises
-    `UnsettledError` if the model diverges.
-    """
+    `UnsettledError` if the model diverges."""
     sleepy, model, step = model, awake(model), with_control(control, law)
     mujoco.mj_forward(model, data)
     first, radius = copy.copy(data), radii(model)
@@ -243,8 +241,7 @@ def mean_velocities(model: Any, data: Any, step: Advance, time: float = WINDOW) 
     """Advance by a window; the mean velocities of bodies in it, (nbody, 6): of centres, m/s, and
     turning, rad/s.
 
-    Raises `UnsettledError` if the model diverges.
-    """
+    Raises `UnsettledError` if the model diverges."""
     mujoco.mj_forward(model, data)
     place, axes, begin = data.xipos.copy(), data.xmat.reshape(-1, 3, 3).copy(), data.time
     steps = max(WINDOW_STEPS, math.ceil(time / model.opt.timestep))

@@ -178,8 +178,7 @@ class Campaign:
         """Keep runs in memory, and forget the earliest of the others while there are more than
         `READ` samples.
 
-        What isn't stored is before it is forgotten, all at once.
-        """
+        What isn't stored is before it is forgotten, all at once."""
         others = [key for key in self._read if key not in runs]
         self._read = {key: self._read[key] for key in others} | dict(runs)
         samples = sum(len(run.time) for run in self._read.values())
@@ -210,8 +209,7 @@ class Campaign:
     def complete(self, tasks: Iterable[Task]) -> list[Failure]:
         """Carry out every task that has no run yet; return those that failed, now or earlier.
 
-        The directory's `FAILURES` lists all that have failed in this campaign, for programs.
-        """
+        The directory's `FAILURES` lists all that have failed in this campaign, for programs."""
         unique = {task.key: task for task in tasks}
         todo = [
             task for key, task in unique.items() if key not in self._files and key not in self._read

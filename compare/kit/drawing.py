@@ -144,8 +144,7 @@ def save(figure: Figure, path: Path) -> None:
     """Write a figure to a file, in the format that its name says, one of `SUFFIXES`; equal figures
     make equal files.
 
-    Raises `StorageError` if it can't be written.
-    """
+    Raises `StorageError` if it can't be written."""
     suffix = path.suffix.lower()
     if suffix == ".svg":
         from compare.kit.pictures import svg  # here, because drawing takes a second to load

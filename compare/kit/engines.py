@@ -51,8 +51,7 @@ Stream = Callable[..., mjsim.Run]
 class Engine:
     """A simulator: how it is run and set, what its results depend on, and its mark in figures.
 
-    One of `simulate` and `stream` is given.
-    """
+    One of `simulate` and `stream` is given."""
 
     name: str
     settings: type[AnySettings]
@@ -133,11 +132,7 @@ def plain(step: float) -> ContactSettings:
 def default_settings(step: float) -> ContactSettings:
     """MuJoCo's own contact parameters on the joints of this study."""
     return ContactSettings(
-        timestep=step,
-        solref=(0.02, 1.0),
-        solreffriction=0.02,
-        solimp=0.9,
-        impratio=1.0,
+        timestep=step, solref=(0.02, 1.0), solreffriction=0.02, solimp=0.9, impratio=1.0
     )
 
 

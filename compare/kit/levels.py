@@ -112,10 +112,7 @@ class Sampling:
     field_kept: int = 4  # most states measured for every case and set
     rates_divisors: tuple[int, int] = (8, 16)  # the two time steps, in parts of the coarse step
     # in SR: with shorter ones an almost unloaded floor carries more or none
-    rates_leaning: tuple[int, int] = (
-        8,
-        16,
-    )
+    rates_leaning: tuple[int, int] = (8, 16)
     rates_more: float = 1  # multiples of the numbers of states in rates.STATES
     laws_divisors: tuple[int, int] = (4, 8)  # the two time steps, in parts of the coarse step
     motions_pieces: int = 6  # of a motion

@@ -18,8 +18,7 @@ class Lock:
     """Held until `release` or the end of the process, whatever ends it; a file in the directory
     says by whom.
 
-    Raises `StorageError`, which names the owner, while another has it. On Windows there is none.
-    """
+    Raises `StorageError`, which names the owner, while another has it. On Windows there is none."""
 
     def __init__(self, directory: Path) -> None:
         self._path = directory / ".lock"

@@ -125,8 +125,7 @@ def _scales(figure: Figure, axes: Axes) -> dict[str, Any]:
     """The box of axes, and of each axis its label, its kind, and (a, b): panels in a row or column
     share one label.
 
-    a + b times the place is the value, or its logarithm.
-    """
+    a + b times the place is the value, or its logarithm."""
     width, height = 72 * figure.get_size_inches()
     box = axes.get_position()
     places = {

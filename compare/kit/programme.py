@@ -20,15 +20,7 @@ from compare.kit import record
 from compare.kit.engines import Engine
 from compare.kit.levels import Level
 from compare.kit.plan import PACE, PLAN, planned
-from compare.kit.record import (
-    Measured,
-    Measurement,
-    Missing,
-    Origin,
-    Planned,
-    Records,
-    Sets,
-)
+from compare.kit.record import Measured, Measurement, Missing, Origin, Planned, Records, Sets
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.tasks import sources
 from compare.kit.workers import threads
@@ -201,8 +193,7 @@ def carry_out(job: Job, before: Records) -> Records:
     Its measurement file is the record of what is done: once it is there, only the runs that a
     figure draws are kept.
 
-    Raises `StorageError` where measurements can't be read or written, or are another engine's.
-    """
+    Raises `StorageError` where measurements can't be read or written, or are another engine's."""
     path, protocol, entry = job.file, job.protocol, PLAN[job.protocol.name]
     label = f"{protocol.name}-{path.parent.name}"
     campaign = job.runner.campaign.part(label, job.name)

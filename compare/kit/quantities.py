@@ -46,13 +46,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from compare.kit.scales import (
-    dragged_speed,
-    rotation_scale,
-    slip_scale,
-    slip_unit,
-    weight,
-)
+from compare.kit.scales import dragged_speed, rotation_scale, slip_scale, slip_unit, weight
 from model import InputError, Parameters
 from model.errors import suggestion
 from model.kinematics import VARIABLES, state_units
@@ -104,11 +98,7 @@ _RATES: tuple[tuple[str, str, str, Scale], ...] = (
 """Variables with a rate of change: name, symbol, unit, and the scale of the rate."""
 _FORCES = {f"{contact}{axis}": f"{contact}_{axis}" for contact in "AB" for axis in "xyz"}
 # determined where both contacts roll
-_FORCES |= {
-    "Ax-By": "A_x − B_y",
-    "Ay+By": "A_y + B_y",
-    "Bx+By": "B_x + B_y",
-}
+_FORCES |= {"Ax-By": "A_x − B_y", "Ay+By": "A_y + B_y", "Bx+By": "B_x + B_y"}
 _ALL = (
     Quantity("case", "case", "1", 0.0),
     Quantity("cases", "cases reached", "1", 0.0),

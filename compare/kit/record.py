@@ -63,10 +63,7 @@ class Measurement:
     def __post_init__(self) -> None:
         quantity(self.quantity)
         # whole numbers and numpy's come back from a file as floats
-        for name in (
-            "value",
-            "uncertainty",
-        ):
+        for name in ("value", "uncertainty"):
             object.__setattr__(self, name, float(getattr(self, name)))
 
     def at(self, name: str) -> float:
@@ -292,8 +289,7 @@ def save(records: Records, path: Path, about: Mapping[str, Any]) -> None:
     """Write records, whole or not at all; `about` says whose they are (JSON-able, see `Origin`).
 
     A condition or a cause of error that a row doesn't have is nan, or empty where it is text.
-    Raises `StorageError`.
-    """
+    Raises `StorageError`."""
     rows = records.measurements
     columns: dict[str, Sequence[Any]] = {"row": range(len(rows))}
     columns |= {name: [getattr(m, name) for m in rows] for name in _OWN}

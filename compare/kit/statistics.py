@@ -1,8 +1,7 @@
 """Numbers with uncertainties: window means and peaks of sampled runs, curves through points;
 numbers as JSON has them.
 
-Of curves: values, slopes, zeros and maxima of polynomials, and exponents of linear motions.
-"""
+Of curves: values, slopes, zeros and maxima of polynomials, and exponents of linear motions."""
 
 from __future__ import annotations
 
@@ -65,8 +64,7 @@ def plain(value: Any) -> Any:
     """Nested data as JSON holds it: dataclasses as mappings, arrays as lists, a case by its name,
     complex as a pair.
 
-    Of numbers that are not finite None is left.
-    """
+    Of numbers that are not finite None is left."""
     if is_dataclass(value):
         value = {each.name: getattr(value, each.name) for each in fields(value)}
     if isinstance(value, Mapping):
@@ -192,8 +190,7 @@ def zero_and_slope(x: Array, y: Array, noise: Array) -> tuple[Estimate, Estimate
     """Zero of the polynomial through all points x, y (n,), and its slope there; nan without one
     zero between them.
 
-    Uncertain by the noise of every y, and a third of what the last degree changes.
-    """
+    Uncertain by the noise of every y, and a third of what the last degree changes."""
 
     def fitted(values: Array, degree: int) -> Array:
         fit = Polynomial.fit(x, values, degree)
@@ -236,8 +233,7 @@ def extrapolated_maximum(
     """The maximum of the place as a function of a quantity, whose value nearest to it is the first;
     nan without one.
 
-    Or what another quantity is there, with its values `others` at the places.
-    """
+    Or what another quantity is there, with its values `others` at the places."""
 
     def maximum(y: Array, n: int) -> float:
         y = y[:n] / np.abs(y).max()

@@ -3,8 +3,7 @@ so.
 
 A mean over the last quarter is free of swings, and its drift tells how far it has to go, as long as
 some of the way is seen. Of a ball that takes minutes seconds show almost none: no limit is taken to
-be nearer than the time in which the fluid takes the ball along lets it be.
-"""
+be nearer than the time in which the fluid takes the ball along lets it be."""
 
 from __future__ import annotations
 
@@ -60,8 +59,7 @@ def last_quarter(
     """Means of each state variable over the last quarter of a run, and how far they may be from
     their limits; None for fewer than `FEWEST` samples.
 
-    time, x : the last samples, (n,) and (n, 8), at least half of all `samples`
-    """
+    time, x : the last samples, (n,) and (n, 8), at least half of all `samples`"""
     length = int(QUARTER * samples)
     if length < FEWEST:
         return None

@@ -155,8 +155,7 @@ def polynomials(
     """Values and slopes at a time, each (2, ...), of polynomials of two degrees through values (n,
     ...).
 
-    By least squares.
-    """
+    By least squares."""
     unit = float(np.ptp(time)) / 2
     powers = [np.vander((time - at) / unit, degree + 1, increasing=True) for degree in degrees]
     fits = [np.linalg.lstsq(each, values, rcond=None)[0] for each in powers]

@@ -188,8 +188,7 @@ def curve(
     """Draw a line of theory (n,) in the colour of its case, where y is finite, and its name if that
     has a place.
 
-    Of several cases that lie on it the colours take turns.
-    """
+    Of several cases that lie on it the colours take turns."""
     text, place = name
     cases = cases if isinstance(cases, tuple) else (cases,)
     label = f"_{text or ', '.join(case.name for case in cases)}"

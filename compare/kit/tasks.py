@@ -140,8 +140,7 @@ def store(
     StorageError
         If a file can't be written.
     TimeoutError
-        If it takes longer than `limit` s.
-    """
+        If it takes longer than `limit` s."""
     check = deadline(limit)
     if task.simulator.simulate:
 

@@ -1,7 +1,6 @@
 """Where tasks run: processes of this machine, or the workers of a Dask scheduler.
 
-Both are executors of `concurrent.futures`, and `Workers` says what else a campaign must know.
-"""
+Both are executors of `concurrent.futures`, and `Workers` says what else a campaign must know."""
 
 from __future__ import annotations
 
@@ -104,11 +103,7 @@ def processes(count: int) -> Workers:
 
     def start() -> Executor:
         # inherited by the workers; numpy reads it when they import it
-        for library in (
-            "OMP",
-            "OPENBLAS",
-            "MKL",
-        ):
+        for library in ("OMP", "OPENBLAS", "MKL"):
             os.environ.setdefault(f"{library}_NUM_THREADS", "1")
         resource_tracker.ensure_running()  # it lets signals through
         with _without_signals():  # a semaphore that is half made would be left
@@ -210,8 +205,7 @@ class _Here(Executor):
 def dask(address: str) -> Workers:
     """The workers of a Dask scheduler, which must see the campaign's directory under the same path.
 
-    Raises `InputError` if Dask isn't installed or no scheduler with workers answers.
-    """
+    Raises `InputError` if Dask isn't installed or no scheduler with workers answers."""
     try:
         from distributed import Client, KilledWorker
     except ImportError as error:

@@ -40,8 +40,7 @@ def write(
     """Write ``summary.json`` and ``report.html`` into the evidence's results directory; return the
     page's path.
 
-    Figures are drawn by `spread`, a `map`. Raises `model.StorageError` if it can't be written.
-    """
+    Figures are drawn by `spread`, a `map`. Raises `model.StorageError` if it can't be written."""
     directory = evidence.directory
     results.save(summary, directory)
     path = directory / results.REPORT
@@ -179,9 +178,7 @@ def columns(records: Records, checks: Mapping[str, Sequence[Check]]) -> dict[str
     """Columns of the page's searchable table: each check, and each unjudged measurement."""
 
     # the same for a copy that another process has judged
-    def identity(
-        m: Measurement,
-    ) -> tuple[Any, ...]:
+    def identity(m: Measurement) -> tuple[Any, ...]:
         conditions = tuple(sorted(m.conditions.items()))
         return m.protocol, m.quantity, m.engine, m.set, m.parameters.omega_0, m.value, conditions
 

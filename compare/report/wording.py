@@ -93,8 +93,7 @@ def findings(verdict: Verdict) -> dict[str, str]:
     """What the numbers of a verdict come to, by heading: the largest deviation, and what error they
     would notice.
 
-    The latter is given by quantity, and left out where only counts are compared.
-    """
+    The latter is given by quantity, and left out where only counts are compared."""
     if not verdict.checks:
         return {}
     check = ranked(verdict.checks)[0]

@@ -1,8 +1,7 @@
 """The subjects of the study: a folder each, with its `measure`, `claims` and `figures`, and a line
 here.
 
-To take one out, remove both.
-"""
+To take one out, remove both."""
 
 from __future__ import annotations
 

@@ -163,8 +163,7 @@ def table(
     """A table for the terminal; with `no_wrap` only its head and first column may take several
     lines.
 
-    `justify` is for all columns but the first, and those of words.
-    """
+    `justify` is for all columns but the first, and those of words."""
     from rich import box
     from rich.table import Table
     from rich.text import Text

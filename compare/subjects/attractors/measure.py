@@ -27,15 +27,7 @@ import numpy as np
 from compare.kit.engines import MOREAU
 from compare.kit.programme import Protocol
 from compare.kit.quantities import QUANTITIES
-from compare.kit.record import (
-    Measured,
-    Missing,
-    Records,
-    Sets,
-    if_found,
-    measurement,
-    state_of,
-)
+from compare.kit.record import Measured, Missing, Records, Sets, if_found, measurement, state_of
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.settling import settled_readings
@@ -151,8 +143,7 @@ class Hops(NamedTuple):
     def values(self) -> dict[str, Estimate]:
         """Period, mean angular velocity and height, uncertain by half the range over single hops.
 
-        Means of two parts could agree by chance, because disturbances swing while they die out.
-        """
+        Means of two parts could agree by chance, because disturbances swing while they die out."""
         span, periods, height = self.time[-1] - self.time[0], np.diff(self.time), self.x[:, 0]
         values = {
             "orbit_period": (span / len(periods), periods),
@@ -338,10 +329,7 @@ def swing(runner: Runner, sets: Sets, records: Records) -> Measured:
         ("swing_period", "swing_omega_c", "swing_size"), *parts, strict=True
     ):
         yield result.row(
-            runner,
-            name,
-            of_no_step(coarse, estimate(fine, part=abs(fine - before))),
-            **conditions,
+            runner, name, of_no_step(coarse, estimate(fine, part=abs(fine - before))), **conditions
         )
 
 

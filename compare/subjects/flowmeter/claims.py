@@ -141,8 +141,7 @@ def _nominal_friction(m: Measurement, off: float) -> dict[str, float]:
     """Nominal friction of a meter, of whose tolerance `off` the measured ball is the worst case
     (the best if off < 0).
 
-    Less friction slips sooner; a rougher wall carries the ball sooner.
-    """
+    Less friction slips sooner; a rougher wall carries the ball sooner."""
     p = m.parameters
     return {"mu": p.mu / (1 - off), "eta": p.eta / (1 - off if slips_first(m) else 1 + off)}
 

@@ -230,8 +230,7 @@ def hysteresis(runner: Runner, sets: Sets, records: Records) -> Measured:
 def _levels(name: str, records: Records, parts: int) -> list[float]:
     """Rising flows in rad s-1: one at which the ball rolls, and those about the changes of case.
 
-    Empty unless a ball from rest slips at one flow and rides the wall at the next.
-    """
+    Empty unless a ball from rest slips at one flow and rides the wall at the next."""
     floor, wall = (settling.settled_cases(records, name, how) for how in ("rest", "on the wall"))
     gives_way = [(a, b) for a, b in pairwise(floor) if (floor[a], floor[b]) == (Case.SS, Case.NR)]
     if not gives_way:
@@ -420,11 +419,6 @@ def first_top(run: Trajectory) -> Estimate:
 
 PROTOCOLS = (
     Protocol("hysteresis", hysteresis, ("settled",)),
-    Protocol(
-        "unloading",
-        unloading,
-        ("thresholds",),
-        drawn=lambda m: m.text("start") == UNLOADED,
-    ),
+    Protocol("unloading", unloading, ("thresholds",), drawn=lambda m: m.text("start") == UNLOADED),
     Protocol("slope", slope, ("settled", "thresholds")),
 )

@@ -39,15 +39,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compare.kit.programme import Protocol
-from compare.kit.record import (
-    Condition,
-    Measured,
-    Missing,
-    Records,
-    Sets,
-    measurement,
-    state_of,
-)
+from compare.kit.record import Condition, Measured, Missing, Records, Sets, measurement, state_of
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.settling import PRESSES, settled_readings
@@ -110,8 +102,7 @@ def laws(runner: Runner, sets: Sets, records: Records) -> Measured:
     """How far each law of contact is off at its worst in motions from rest, down the wall, and
     along the floor.
 
-    And the speed at which balls sink in the middle of still fluid, off floor and wall.
-    """
+    And the speed at which balls sink in the middle of still fluid, off floor and wall."""
     tasks = []
     for p in sets.values():
         t_end, fast = RUN_LENGTH * coarse_step(p), 3.0 / time_unit(p)

@@ -307,8 +307,7 @@ def _next_line(edge: Edge) -> Edge:
     """The edge with the next line to search: from where the last two runs still agreed, along which
     they part.
 
-    Together they are within 2e-3 of the distance of the attractors.
-    """
+    Together they are within 2e-3 of the distance of the attractors."""
     if edge.bracket is None:
         return edge
     both = [run.x for run in edge.bracket.runs if run is not None]
@@ -382,8 +381,7 @@ def birth(runner: Runner, sets: Sets, records: Records) -> Measured:
     """The drag at which the fold is born, where d omega_0/dA_y along the branch of SS is zero at
     its end, A_y = 0.
 
-    The zero of the straight line through the slopes as a function of 1/c.
-    """
+    The zero of the straight line through the slopes as a function of 1/c."""
     ranges = {}
     for name in sets:
         begins, ends = records.threshold(name, "omega_01"), records.threshold(name, "omega_02")

@@ -26,8 +26,7 @@ def draw(of: Diagram) -> tuple[Figure, str]:
     """A figure of the slip at the wall over time, and of its path in the orthogonal plane (55); and
     its caption.
 
-    The motion is that of the event-driven simulation from the formal stationary state of NR.
-    """
+    The motion is that of the event-driven simulation from the formal stationary state of NR."""
     check_thresholds(of.p)
     flow, lasts = MOTIONS[of.figure]
     p = of.p.replace(omega_0=flow * thresholds(of.p).omega_02)

@@ -503,8 +503,7 @@ def _growths(runner: Runner, rows: Sequence[Sequence[Push]]) -> list[Growths]:
     """gamma for every row of pushes, from two sizes of slip with the shorter step, and one with the
     longer one.
 
-    It is uncertain by what the step and the degree of the polynomials change.
-    """
+    It is uncertain by what the step and the degree of the polynomials change."""
     tasks, divisor = [], runner.sampling.bounds_divisor
     for push in (push for pushes in rows for push in pushes):
         large, small = push.sizes if push.inner is not Case.NR else FAST_SLIPS

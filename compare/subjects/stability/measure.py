@@ -211,8 +211,7 @@ def chosen_states(
     """States of a set to be pushed: one that spins on the spot next to the wall, and several
     settled ones of each case.
 
-    Where there are fewer that can be pushed, the rest is missing.
-    """
+    Where there are fewer that can be pushed, the rest is missing."""
     unit = time_unit(p)
     spinning = State(slip_y=SPIN / unit * p.R / p.r).stacked()
     yield Pushed(Start(name, p.replace(omega_0=0.0), "spinning", spinning), Case.RS)
@@ -221,10 +220,7 @@ def chosen_states(
         values.setdefault((m.parameters, physical_case(m.case())), {})[m.quantity] = m.value
     states = []
     # on the wall alone it is high up, and just touching the floor
-    for (
-        q,
-        case,
-    ), value in values.items():
+    for (q, case), value in values.items():
         x = State(**value | {"y": 0.0, "h": 0.0, "v_h": 0.0})
         raised = x._replace(y=safe_height(q)) if case.A is Contact.N else x
         states.append(Pushed(Start(name, q, "settled", raised.stacked()), case))
@@ -402,11 +398,7 @@ def _responses(state: Pushed, answers: Sequence[Array], row: Row) -> Iterator[Me
     }
     for (i, of), (j, by) in product(enumerate(names), repeat=2):
         yield row(
-            quantity="response",
-            value=estimate(value[i, j], **budget),
-            time=time,
-            of=of,
-            pushed=by,
+            quantity="response", value=estimate(value[i, j], **budget), time=time, of=of, pushed=by
         )
 
 
@@ -414,8 +406,7 @@ def natural_size(rate: float, other: float, p: Parameters) -> float:
     """Natural size in s-1 of the real or imaginary part of an exponent, of which `other` is the
     other part.
 
-    Its own, or that of the exponent if it is none, or else that of free fall.
-    """
+    Its own, or that of the exponent if it is none, or else that of free fall."""
     for size in (abs(rate), math.hypot(rate, other)):
         if size > ZERO_RATE * p.c:
             return size

@@ -168,7 +168,4 @@ def _row(
     return measurement(runner, protocol, start.set, start.p, name, value, [each.task], **at)
 
 
-PROTOCOLS = (
-    Protocol("settled", measure),
-    Protocol("mirrored", mirrored),
-)
+PROTOCOLS = (Protocol("settled", measure), Protocol("mirrored", mirrored))

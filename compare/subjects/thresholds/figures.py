@@ -55,8 +55,7 @@ def draw_plane(plane: Diagram) -> tuple[Figure, str]:
     """A figure of regions with their names, thresholds between them, and points at which runs
     ended; and its caption.
 
-    Friction of floor and wall are equal in Fig. 8; in Fig. 7 that of the floor is fixed.
-    """
+    Friction of floor and wall are equal in Fig. 8; in Fig. 7 that of the floor is fixed."""
     p, equal = plane.p, plane.figure == "fig-8"
     figure = style.figure(6.4, 4.9)
     axes = figure.add_subplot()

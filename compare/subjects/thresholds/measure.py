@@ -489,8 +489,7 @@ def _fold(each: Findings) -> Iterator[tuple[Passage, Search]]:
     """A search for the largest flow at which a ball on the floor settles, about the maximum of
     omega_0 on the branch.
 
-    At a fold all slows down, like the root of the distance.
-    """
+    At a fold all slows down, like the root of the distance."""
     top, _ = _end_of_slipping(each)
     if top and each.runner.sampling.slow:
         narrowest = each.runner.sampling.thresholds_fold

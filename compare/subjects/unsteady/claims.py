@@ -155,12 +155,7 @@ CLAIMS = (
         "does not change the mean, under Stokes' law.",
         Criterion("pulsation", "mean_error", _mean_error, when=given(slips=_BOTH), by=_MEAN),
         Criterion(
-            "pulsation",
-            "mean_error",
-            _mean_error,
-            when=given(slips=_ONE),
-            size=_flow,
-            by=_MEAN,
+            "pulsation", "mean_error", _mean_error, when=given(slips=_ONE), size=_flow, by=_MEAN
         ),
         Criterion(
             "pulsation",

@@ -10,8 +10,7 @@
 * The flow changes once by a small jump. Half the difference of two runs, after a jump up and one
   down, is free of what goes with the square of the jump.
 * A ramp starts from settled slipping well below the end of it, and ends well above; the ball has
-  left slipping once it lags by half as much as at first.
-"""
+  left slipping once it lags by half as much as at first."""
 
 from __future__ import annotations
 
@@ -216,12 +215,7 @@ def _onset(runner: Runner, each: Pulsation, bracket: Bracket) -> Measurement | M
         )
     # Near the phase at which it sets in, slip lasts for 2 sqrt(2 e) rad beyond the onset by e.
     unseen = (math.pi * LASTING / runner.sampling.pulsation_samples) ** 2 / 2 * place.value
-    return each.row(
-        runner,
-        "slip_amplitude",
-        place.also(unseen_slip=unseen),
-        bracket.tasks,
-    )
+    return each.row(runner, "slip_amplitude", place.also(unseen_slip=unseen), bracket.tasks)
 
 
 class Round(NamedTuple):
@@ -304,11 +298,7 @@ def _raised(runner: Runner, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
     todo = [k for k, each in enumerate(pulsations) if each.p.drag != STOKES]
     for _ in range(12):
         higher = [
-            replace(
-                each,
-                amplitude=RAISED * each.amplitude,
-                lead=each.lead * RAISED**each.power,
-            )
+            replace(each, amplitude=RAISED * each.amplitude, lead=each.lead * RAISED**each.power)
             for each in (raised[k] for k in todo)
         ]
         still = [
