@@ -85,72 +85,32 @@ _BLOW = {
 _ROLL = {"a hollow sphere": {"j": 1.5}, "no drag": {"c": 0.0}}
 _SLIP = {"friction 5 % too weak": {"mu": 0.95, "eta": 0.95}, "no drag": {"c": 0.0}}
 """Wrong answers for what lands, rolls and slips: factors of parameters, or a restitution."""
+# fmt: off
 VESSEL: tuple[tuple[str, str, Parameters, State, float, Mapping[str, Mapping[str, float]]], ...] = (
-    (
-        "rolls-on-both",
-        "rolling on floor and wall it is sped up by the fluid (RR)",
-        SLOW,
-        State(omega_c=8.0),
-        4.0,
-        _ROLL,
-    ),
-    (
-        "from-rest",
-        "from rest it slips on the wall, then rolls on both, ever faster (RS, RR)",
-        SLOW,
-        State(),
-        8.0,
-        _ROLL,
-    ),
-    (
-        "slips-on-both",
-        "slipping on floor and wall it comes to its stationary state (SS)",
-        SLOW.replace(omega_0=25.0),
-        State(omega_c=14.35, slip_x=-1.0, slip_y=2.0, slip_z=7.0),
-        2.0,
-        _SLIP,
-    ),
-    (
-        "rides-the-wall",
-        "the wall alone carries it, and it rolls there (NR)",
-        ROUGH,
-        State(y=0.1, v_y=0.1, omega_c=22.0, slip_x=5.0),
-        1.0,
-        _ROLL,
-    ),
-    (
-        "onset-of-slip",
-        "rolling on both it gets too fast and begins to slip on both, at 1.1 s (RR, SS)",
-        SLOW.replace(omega_0=20.0),
-        State(omega_c=8.0),
-        3.0,
-        _SLIP,
-    ),
-    (
-        "lands",
-        "it slides down the wall, lands on the floor, slips on both, then rolls (NS, SS, RR)",
-        SLOW,
-        State(y=0.02, v_y=-0.2, omega_c=12.0, slip_x=30.0, slip_y=-10.0, slip_z=20.0),
-        0.5,
-        _BLOW,
-    ),
-    (
-        "hits-the-wall",
-        "it slides on the floor, hits the wall, slips on both, then rolls (SN, SS, RR)",
-        SLOW,
-        State(omega_c=10.0, slip_x=20.0, slip_y=10.0, slip_z=30.0, h=0.01, v_h=-0.3),
-        0.5,
-        _BLOW,
-    ),
-    (
-        "falls-in",
-        "it flies, meets the wall, then the floor, comes back to the wall (NN, NS, RN, RS, RR)",
-        SLOW,
-        State(y=0.05, h=0.03, omega_c=8.0, v_h=-0.3),
-        0.7,
-        _BLOW,
-    ),
+    ("rolls-on-both", "rolling on floor and wall it is sped up by the fluid (RR)",
+     SLOW, State(omega_c=8.0), 4.0, _ROLL),
+    ("from-rest", "from rest it slips on the wall, then rolls on both, ever faster (RS, RR)",
+     SLOW, State(), 8.0, _ROLL),
+    ("slips-on-both", "slipping on floor and wall it comes to its stationary state (SS)",
+     SLOW.replace(omega_0=25.0), State(omega_c=14.35, slip_x=-1.0, slip_y=2.0, slip_z=7.0),
+     2.0, _SLIP),
+    ("rides-the-wall", "the wall alone carries it, and it rolls there (NR)",
+     ROUGH, State(y=0.1, v_y=0.1, omega_c=22.0, slip_x=5.0), 1.0, _ROLL),
+    ("onset-of-slip",
+     "rolling on both it gets too fast and begins to slip on both, at 1.1 s (RR, SS)",
+     SLOW.replace(omega_0=20.0), State(omega_c=8.0), 3.0, _SLIP),
+    ("lands", "it slides down the wall, lands on the floor, slips on both, then rolls (NS, SS, RR)",
+     SLOW, State(y=0.02, v_y=-0.2, omega_c=12.0, slip_x=30.0, slip_y=-10.0, slip_z=20.0),
+     0.5, _BLOW),
+    ("hits-the-wall",
+     "it slides on the floor, hits the wall, slips on both, then rolls (SN, SS, RR)",
+     SLOW, State(omega_c=10.0, slip_x=20.0, slip_y=10.0, slip_z=30.0, h=0.01, v_h=-0.3),
+     0.5, _BLOW),
+    ("falls-in",
+     "it flies, meets the wall, then the floor, comes back to the wall (NN, NS, RN, RS, RR)",
+     SLOW, State(y=0.05, h=0.03, omega_c=8.0, v_h=-0.3), 0.7, _BLOW),
 )
+# fmt: on
 """The paper's ball: name, what happens, parameters, start, duration in s, and wrong answers."""
 
 

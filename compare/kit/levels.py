@@ -191,80 +191,18 @@ LOW = {"mu": 0.05, "eta": 0.05, "j": 0.2, "r/R": 0.1, "kappa": 0.05, "R": 0.04, 
 HIGH = {"mu": 1.0, "eta": 1.0, "j": 0.66, "r/R": 0.4, "kappa": 0.4, "R": 0.08, "g": 10.0, "m": 0.05}
 """Ranges of the design; lengths in m, masses in kg, g in m s-2."""
 
-_CHOSEN = {
-    "rough-floor": {
-        "m": 0.02,
-        "r": 0.012,
-        "R": 0.06,
-        "j": 0.3,
-        "mu": 0.45,
-        "eta": 0.15,
-        "g": 9.81,
-        "c": 2.0,
-    },
-    "rough-wall": {
-        "m": 0.05,
-        "r": 0.015,
-        "R": 0.05,
-        "j": 0.55,
-        "mu": 0.15,
-        "eta": 0.35,
-        "g": 8.0,
-        "c": 1.5,
-    },
-    "thick-fluid": {
-        "m": 0.03,
-        "r": 0.008,
-        "R": 0.04,
-        "j": 0.45,
-        "mu": 0.25,
-        "eta": 0.1,
-        "g": 9.0,
-        "c": 5.0,
-    },
-    "heavy-core": {
-        "m": 0.01,
-        "r": 0.02,
-        "R": 0.07,
-        "j": 0.25,
-        "mu": 0.7,
-        "eta": 0.5,
-        "g": 9.5,
-        "c": 2.5,
-    },
-    "wake": {
-        "m": 0.02,
-        "r": 0.012,
-        "R": 0.06,
-        "j": 0.42,
-        "mu": 0.5,
-        "eta": 0.2,
-        "g": 9.0,
-        "c": 1.4,
-        "nu_f": 8e-5,
-    },
-    "blunt": {
-        "m": 0.03,
-        "r": 0.01,
-        "R": 0.05,
-        "j": 0.4,
-        "mu": 0.5,
-        "eta": 0.2,
-        "g": 8.5,
-        "c": 1.2,
-        "nu_f": 4e-5,
-    },
-    "rubber-wall": {
-        "m": 0.04,
-        "r": 0.01,
-        "R": 0.055,
-        "j": 0.35,
-        "mu": 0.3,
-        "eta": 0.8,
-        "g": 7.0,
-        "c": 3.0,
-    },
+# fmt: off
+_FIELDS = ("m", "r", "R", "j", "mu", "eta", "g", "c", "nu_f")
+_CHOSEN: dict[str, tuple[float, ...]] = {
+    "rough-floor": (0.02, 0.012,  0.06,  0.3, 0.45, 0.15, 9.81, 2.0),
+    "rough-wall":  (0.05, 0.015,  0.05, 0.55, 0.15, 0.35,  8.0, 1.5),
+    "thick-fluid": (0.03, 0.008,  0.04, 0.45, 0.25,  0.1,  9.0, 5.0),
+    "heavy-core":  (0.01,  0.02,  0.07, 0.25,  0.7,  0.5,  9.5, 2.5),
+    "wake":        (0.02, 0.012,  0.06, 0.42,  0.5,  0.2,  9.0, 1.4, 8e-05),
+    "blunt":       (0.03,  0.01,  0.05,  0.4,  0.5,  0.2,  8.5, 1.2, 4e-05),
+    "rubber-wall": (0.04,  0.01, 0.055, 0.35,  0.3,  0.8,  7.0, 3.0),
 }
+# fmt: on
 _DRAG = {"wake": SCHILLER_NAUMANN, "blunt": QUADRATIC}
 """The laws of those that have another than Stokes'."""
 
@@ -272,10 +210,10 @@ _DRAG = {"wake": SCHILLER_NAUMANN, "blunt": QUADRATIC}
 def sets(level: Level) -> dict[str, Parameters]:
     """The sets of a level by name."""
     named = {name: Parameters.named(name) for name in ("reference", "high-wall-friction")}
-    chosen = {
-        name: Parameters(**values, omega_0=1.0, drag=_DRAG.get(name, STOKES))
-        for name, values in _CHOSEN.items()
-    }
+    chosen = {}
+    for name, row in _CHOSEN.items():
+        values = dict(zip(_FIELDS, row, strict=False))
+        chosen[name] = Parameters(**values, omega_0=1.0, drag=_DRAG.get(name, STOKES))
     sets = named | chosen
     if level > Level.QUICK:  # a scrambled Sobol sequence fills the box evenly
         low, high = np.array(list(LOW.values())), np.array(list(HIGH.values()))

@@ -203,6 +203,13 @@ def settle_finer(
     return settle(runner, starts, replace(criteria, divisor=divisor * criteria.divisor))
 
 
+def not_found_again(coarse: SteadyState, fine: SteadyState) -> str:
+    """Why a state isn't that which half the step finds, SR and NR being one; empty if it is."""
+    if fine.failure or physical_case(coarse.case) is physical_case(fine.case):
+        return fine.failure
+    return f"{coarse.case.name} is {fine.case.name} with half the step"
+
+
 def with_changes(
     value: Estimate, change: float, p: Parameters, size: float, divisor: float
 ) -> Estimate:
@@ -235,8 +242,7 @@ def settled_readings(runner: Runner, protocol: str, starts: Sequence[Start]) -> 
     for coarse, fine in zip(states, settle_finer(runner, states, criteria), strict=True):
         p, name = fine.start.p, fine.start.set
         yield measurement(runner, protocol, name, p, "case", coarse.case, [coarse.task])
-        if fine.failure or fine.case is not coarse.case:
-            why = fine.failure or f"{coarse.case.name} is {fine.case.name} with half the step"
+        if why := not_found_again(coarse, fine):
             yield Missing(protocol, name, why)
             continue
         read, size = fine.values["omega_c"], quantity("omega_c").size(p)

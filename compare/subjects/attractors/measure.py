@@ -93,9 +93,8 @@ def hopping(
         q, end = p.replace(omega_0=omega_0), (k + 1) * HOLD
         coarse, fine = (tops(run, end - MEASURED, end) for run in (result.coarse, result.fine))
         if min(len(coarse.time), len(fine.time)) < 6:
-            yield Missing(
-                protocol, SET, f"at omega_0 = {omega_0:.4g} rad/s the ball does not hop any more"
-            )
+            why = f"at omega_0 = {omega_0:.4g} rad/s the ball does not hop any more"
+            yield Missing(protocol, SET, why)
             break
         row = partial(
             measurement, runner, protocol, SET, q, tasks=result.tasks, **fine.conditions(q)

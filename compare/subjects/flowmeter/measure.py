@@ -73,9 +73,8 @@ def slope(runner: Runner, sets: Sets, records: Records) -> Measured:
                 yield if_found(row, f"{where}: no slope")
             else:
                 cases = ", ".join(each.case.name for each in states)
-                yield Missing(
-                    "slope", curve.set, f"{where}: the states there are not of one kind ({cases})"
-                )
+                why = f"{where}: the states there are not of one kind ({cases})"
+                yield Missing("slope", curve.set, why)
 
 
 @dataclass(frozen=True)
@@ -172,11 +171,8 @@ def hysteresis(runner: Runner, sets: Sets, records: Records) -> Measured:
                 Start(name, p.replace(omega_0=flow), side, np.zeros(8)) for side, flow in sides
             ]
         else:
-            yield Missing(
-                "hysteresis",
-                name,
-                "no flow at which slipping on the floor gives way to riding the wall",
-            )
+            why = "no flow at which slipping on the floor gives way to riding the wall"
+            yield Missing("hysteresis", name, why)
     tasks = []
     for loop in loops.values():  # a run through all levels, each held for a time
         p, flows = loop[0].p, [level.p.omega_0 for level in loop]
@@ -271,11 +267,8 @@ def unloading(runner: Runner, sets: Sets, records: Records) -> Measured:
     starts, pairs = [], []
     for name, p in sets.items():
         if (limit := records.threshold(name, "omega_02")) is None:
-            yield Missing(
-                "unloading",
-                name,
-                "no flow was measured that is the least to hold a ball on the wall",
-            )
+            why = "no flow was measured that is the least to hold a ball on the wall"
+            yield Missing("unloading", name, why)
             continue
         # A pushed ball must neither sink nor roll again: the flow is above the end of rolling by
         # lifting, too.
@@ -292,11 +285,8 @@ def unloading(runner: Runner, sets: Sets, records: Records) -> Measured:
     ):
         for state, names in zip(states, ((LANDING, UNLOADED), (UPWARDS, BY_SPIN)), strict=True):
             if state.failure:
-                yield Missing(
-                    "unloading",
-                    state.start.set,
-                    f"no ball to begin with on the wall: {state.failure}",
-                )
+                why = f"no ball to begin with on the wall: {state.failure}"
+                yield Missing("unloading", state.start.set, why)
             else:
                 pairs += [_pair(runner, state, name) for name in names]
     kinds: dict[Shown, list[tuple[StepPairResult, Estimate, float]]] = {}
@@ -308,11 +298,8 @@ def unloading(runner: Runner, sets: Sets, records: Records) -> Measured:
         if name != LANDING and before is case:
             yield result.row(runner, "case", case)
         elif name != LANDING:
-            yield Missing(
-                "unloading",
-                result.pair.set,
-                f"{name}: with half the time step the ball ends up otherwise",
-            )
+            why = f"{name}: with half the time step the ball ends up otherwise"
+            yield Missing("unloading", result.pair.set, why)
         if coarse.keys() != fine.keys() or (name == LANDING and not fine):
             yield Missing("unloading", result.pair.set, f"{name}: the ball does not slip and land")
             continue

@@ -654,19 +654,11 @@ def whole_runs(runner: Runner, sets: Sets, records: Records) -> Measured:
         p, how, coarse, fine = run.pair.p, run.pair.name, run.coarse, run.fine
         time = float(fine.time[-1])
         if coarse.case[-1] != fine.case[-1]:
-            yield Missing(
-                "runs",
-                run.pair.set,
-                f"{how}: with half the time step the ball ends in another case",
-                run.pair.rows,
-            )
+            why = f"{how}: with half the time step the ball ends in another case"
+            yield Missing("runs", run.pair.set, why, run.pair.rows)
         elif how == "rough floor" and fine.force_A[:, 1].mean() < PRESSES * p.m * p.g:
-            yield Missing(
-                "runs",
-                run.pair.set,
-                f"{how}: the contact force is so small that the ball may hover",
-                run.pair.rows,
-            )
+            why = f"{how}: the contact force is so small that the ball may hover"
+            yield Missing("runs", run.pair.set, why, run.pair.rows)
         else:
             if apart := how in ("smooth wall", "rough floor"):
                 yield run.row(runner, "case", float(fine.case[-1]), time=time)

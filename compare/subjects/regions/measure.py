@@ -108,9 +108,8 @@ def planes(runner: Runner, sets: Sets, records: Records) -> Measured:
     for plane in both:
         if out := len(plane.tried) - len(plane.seen):
             at = f"{plane.figure}: {out} of {len(plane.tried)} points"
-            yield Missing(
-                "plane", "reference", f"{at} are left out, too close to a change of case to settle"
-            )
+            why = f"{at} are left out, too close to a change of case to settle"
+            yield Missing("plane", "reference", why)
 
 
 def added_points(seen: Sequence[tuple[Array, int]]) -> list[Array]:
@@ -163,9 +162,8 @@ def borders(runner: Runner, sets: Sets, records: Records) -> Measured:
         elif holds and folds:
             limits[name] = holds.value, folds.value
         else:
-            yield Missing(
-                "edge", name, "at no flow are a slipping ball and a lifted one both settled"
-            )
+            why = "at no flow are a slipping ball and a lifted one both settled"
+            yield Missing("edge", name, why)
     at_quick = runner.level is Level.QUICK
     soonest = max(limits, key=lambda name: sets[name].c, default="") if at_quick else ""
     flows = [
@@ -187,11 +185,8 @@ def borders(runner: Runner, sets: Sets, records: Records) -> Measured:
             or (slipping.case, physical_case(lifted.case)) != (Case.SS, Case.NR)
         ):
             came_to = ", ".join(state.failure or state.case.name for state in (slipping, lifted))
-            yield Missing(
-                "edge",
-                name,
-                f"no two attractors settled at omega_0 = {p.omega_0:.4g} rad/s: {came_to}",
-            )
+            why = f"no two attractors settled at omega_0 = {p.omega_0:.4g} rad/s: {came_to}"
+            yield Missing("edge", name, why)
         else:
             a, b = _on_floor_and_wall(slipping.mean), _on_floor_and_wall(lifted.mean)
             edges.append(Edge(name, p, a, b, a, b - a))
@@ -218,11 +213,8 @@ def borders(runner: Runner, sets: Sets, records: Records) -> Measured:
             row = measurement(runner, "edge", name, p, "omega_02", place, tasks, **at)
             yield if_found(row, "the edge points to no flow at which it meets the lifted ball")
         elif name == soonest or not at_quick:
-            yield Missing(
-                "edge",
-                name,
-                "too few crossings to follow the edge to where it meets the lifted ball",
-            )
+            why = "too few crossings to follow the edge to where it meets the lifted ball"
+            yield Missing("edge", name, why)
 
 
 @dataclass(frozen=True, eq=False)
@@ -344,9 +336,8 @@ def _edge_rows(runner: Runner, edge: Edge) -> Measured:
     """Measurements of the state on an edge: omega_c, slips and the spin on the wall."""
     if not (edge.moves and edge.bracket):  # it is to be crossed by the last line, and by one before
         at = f"at omega_0 = {edge.p.omega_0:.4g} rad/s"
-        yield Missing(
-            "edge", edge.set, f"{at} the last lines missed the border between the two attractors", 5
-        )
+        why = f"{at} the last lines missed the border between the two attractors"
+        yield Missing("edge", edge.set, why, 5)
         return
     x, sure = State.of(edge.crossing), State.of(_uncertainty(edge))
     roll = edge.p.R / edge.p.r
@@ -420,15 +411,11 @@ def birth(runner: Runner, sets: Sets, records: Records) -> Measured:
         ]
     for name, p in sets.items():
         if name not in ranges:
-            yield Missing(
-                "birth", name, "there is no range of slipping at both points that ends at the wall"
-            )
+            why = "there is no range of slipping at both points that ends at the wall"
+            yield Missing("birth", name, why)
         elif len(found[name]) < len(FIRST_DRAGS) + len(NEARER_DRAGS):
-            yield Missing(
-                "birth",
-                name,
-                "too few states of slipping at both points settle near the end of the branch",
-            )
+            why = "too few states of slipping at both points settle near the end of the branch"
+            yield Missing("birth", name, why)
         else:
             lag = lags[name]
             drag = replace(lag.times(1 / lag.value**2), value=1 / lag.value)

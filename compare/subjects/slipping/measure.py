@@ -111,11 +111,8 @@ def measure(runner: Runner, sets: Sets, records: Records) -> Measured:
         for push in pushes:
             own, pairs = next(runs)
             if isinstance(pairs, str):
-                yield Missing(
-                    "growth",
-                    push.start.set,
-                    f"from {push.inner.name} to {push.outer.name}: the run {pairs}",
-                )
+                why = f"from {push.inner.name} to {push.outer.name}: the run {pairs}"
+                yield Missing("growth", push.start.set, why)
                 continue
             if value := growth(push, pairs):
                 grown.append(value)
@@ -142,12 +139,8 @@ def measure(runner: Runner, sets: Sets, records: Records) -> Measured:
             )
             yield push.row(runner, "growth", "filippov_share", share, own)
     for (name, inner, outer), count in left.items():
-        yield Missing(
-            "growth",
-            name,
-            f"slips from {inner.name} to {outer.name} pass through several cases",
-            count,
-        )
+        why = f"slips from {inner.name} to {outer.name} pass through several cases"
+        yield Missing("growth", name, why, count)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 from compare.kit import settling
@@ -103,14 +103,8 @@ def _values(
 ) -> Measured:
     """Values of a settled state with half the step; uncertain by step and start."""
     p = fine.start.p
-    if fine.failure:
-        yield _unsettled(fine, len(fine.values), protocol)
-    elif settling.physical_case(fine.case) is not settling.physical_case(same[0].case):
-        why = (
-            f"{same[0].case.name} at omega_0 = {p.omega_0:.4g} rad/s is {fine.case.name} with "
-            "half the time step"
-        )
-        yield Missing(protocol, fine.start.set, why, len(fine.values))
+    if why := settling.not_found_again(same[0], fine):
+        yield _unsettled(replace(fine, failure=why), len(fine.values), protocol)
     else:
         for group in settling.ERROR_GROUPS:
             sizes = {
@@ -152,12 +146,8 @@ def _unsettled(each: SteadyState, rows: int, protocol: str = PROTOCOL) -> Missin
     """A record of a start from which the ball did not settle, and of what it did last."""
     p = each.start.p
     at = f"omega_0 = {p.omega_0:.4g} rad/s (mu = {p.mu:.4g}, eta = {p.eta:.4g})"
-    return Missing(
-        protocol,
-        each.start.set,
-        f"not settled at {at} (start: {each.start.name}): {each.failure}",
-        rows,
-    )
+    why = f"not settled at {at} (start: {each.start.name}): {each.failure}"
+    return Missing(protocol, each.start.set, why, rows)
 
 
 def _row(

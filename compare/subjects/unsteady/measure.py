@@ -81,11 +81,8 @@ def pulsation(runner: Runner, sets: Sets, records: Records) -> Measured:
     small = []  # about a flow at which a ball rolls, at several frequencies
     for name, p in sets.items():
         if (end := _threshold(records, name, "omega_01")) is None:
-            yield Missing(
-                "pulsation",
-                name,
-                "no flow was measured at which two-point rolling ends by slipping",
-            )
+            why = "no flow was measured at which two-point rolling ends by slipping"
+            yield Missing("pulsation", name, why)
             continue
         q = p.replace(omega_0=ROLLS_AT * end)
         room, lowest = end - q.omega_0, _lowest(p)
@@ -118,11 +115,8 @@ def pulsation(runner: Runner, sets: Sets, records: Records) -> Measured:
             slipping.append((each, 1.5 * onset.value))
         else:
             at = f"a pulsation at {each.frequency:g} Hz"
-            yield Missing(
-                "pulsation",
-                each.set,
-                f"slip in {at} begins at no definite amplitude: no mean reading there",
-            )
+            why = f"slip in {at} begins at no definite amplitude: no mean reading there"
+            yield Missing("pulsation", each.set, why)
     strong = [each for name, p in sets.items() for each in _strong(name, p, records)]
     yield from mean_errors(runner, slipping + strong)
 
@@ -208,11 +202,8 @@ def _onset(runner: Runner, each: Pulsation, bracket: Bracket) -> Measurement | M
         return Missing("pulsation", each.set, f"in {at} there is slip at no amplitude, or at all")
     alone = np.abs(low.slip_speed_A - low.slip_speed_B)[low.time > low.time[-1] / 6].max()
     if alone > 2e-4 * math.sqrt(each.p.g * each.p.R):
-        return Missing(
-            "pulsation",
-            each.set,
-            f"in {at} one contact slips before both do, too little to tell when",
-        )
+        why = f"in {at} one contact slips before both do, too little to tell when"
+        return Missing("pulsation", each.set, why)
     # Near the phase at which it sets in, slip lasts for 2 sqrt(2 e) rad beyond the onset by e.
     unseen = (math.pi * LASTING / runner.sampling.pulsation_samples) ** 2 / 2 * place.value
     return each.row(runner, "slip_amplitude", place.also(unseen_slip=unseen), bracket.tasks)
@@ -360,11 +351,8 @@ def mean_errors(runner: Runner, slipping: Sequence[tuple[Pulsation, float]]) -> 
     for (each, amplitude), seen in zip(slipping, rounds, strict=True):
         at = f"the mean reading at {each.frequency:g} Hz"
         if isinstance(seen, str) or isinstance(again := next(begun), str):
-            yield Missing(
-                "pulsation",
-                each.set,
-                f"{at}: {seen if isinstance(seen, str) else f'the run {again}'}",
-            )
+            why = f"{at}: {seen if isinstance(seen, str) else f'the run {again}'}"
+            yield Missing("pulsation", each.set, why)
             continue
         (_, run, _), (task, halved, _) = seen
         turns = np.array([period.theta[-1] - period.theta[0] for period in again])
@@ -409,11 +397,8 @@ def jumps(runner: Runner, sets: Sets, records: Records) -> Measured:
     for name, p in sets.items():
         begins, holds, ends = (_threshold(records, name, f"omega_0{n}") for n in (1, 2, 4))
         if begins is None or holds is None:
-            yield Missing(
-                "unsteady",
-                name,
-                "no flows were measured between which the ball slips at both points",
-            )
+            why = "no flows were measured between which the ball slips at both points"
+            yield Missing("unsteady", name, why)
             continue
         flows[name] = begins, holds, ends or math.nan
         if p.drag == STOKES:  # with other laws the delay depends on the size of the jump
@@ -423,11 +408,8 @@ def jumps(runner: Runner, sets: Sets, records: Records) -> Measured:
         q = p.replace(omega_0=begins + SLIPS_AT * (holds - begins))
         starts.append(Start(name, q, "jump", np.zeros(8)))
         if ends is None:
-            yield Missing(
-                "unsteady",
-                name,
-                "no flow was measured at which slipping at both points ends in a jump",
-            )
+            why = "no flow was measured at which slipping at both points ends in a jump"
+            yield Missing("unsteady", name, why)
         else:
             q = p.replace(omega_0=begins + RAMP[0] * (ends - begins))
             starts.append(Start(name, q, "ramp", np.zeros(8)))
