@@ -155,8 +155,7 @@ class Judged:
 
     @property
     def resolving_power(self) -> dict[str, float]:
-        """By quantity, the smallest relative error of theory that every conclusive check would
-        notice.
+        """By quantity, the smallest relative error that every conclusive check would notice.
 
         That of all checks where none is conclusive."""
         power: dict[str, float] = {}
@@ -211,8 +210,7 @@ class Verdict(Judged):
     def passed(self) -> bool:
         """Whether the outcome is the one to be expected.
 
-        What an example refutes is refuted on the sets of the study; a user's own set may hold no
-        such example."""
+        An example refutes on the sets of the study; a user's own set may hold no such example."""
         if self.outcome is Outcome.CONFIRMED and self.claim.expected is Outcome.REFUTED:
             return not {check.measurement.set for check in self.checks} & sets(Level.FULL).keys()
         return self.outcome is self.claim.expected

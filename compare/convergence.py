@@ -148,8 +148,7 @@ def _hidden_by_brackets(series: StepSeries) -> float:
 
 
 def extrapolated(steps: Array, errors: Array, own: Array) -> tuple[Estimate, float]:
-    """The limit of errors (n,) with steps (n,) in natural units, the coarsest first, and the
-    observed order.
+    """The limit of errors (n,) with steps (n,) in natural units, and the observed order.
 
     `own` (n,) are standard uncertainties of the errors that have nothing to do with the step. Where
     the last three errors differ by no more than these, the last is the limit, and the order nan; at

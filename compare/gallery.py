@@ -150,8 +150,7 @@ def of_results(evidence: Evidence) -> Selected:
 def write(
     output: Path, selected: Selected, formats: Sequence[str] = ("svg",)
 ) -> Iterator[tuple[str, str]]:
-    """Write figures to a directory, and their captions; yield the name of each, and why it wasn't
-    drawn if so.
+    """Write figures to a directory, with captions; yield each name, and why not if so.
 
     Raises `InputError` for an unknown format, `StorageError` if a file can't be written."""
     for suffix in formats:
@@ -178,11 +177,9 @@ def write(
 def pictures(
     evidence: Evidence, drawings: Mapping[str, Drawing], spread: Spread = map
 ) -> tuple[dict[str, dict[str, str]], str]:
-    """For a page: each figure's picture and caption, or why there is none, by name; and the letters
-    that they share.
+    """For a page: each figure's picture and caption by name, and the letters that they share.
 
-    Each is drawn once, by `spread`, a `map`, and kept in `PICTURES` of the results with a hash of
-    all that it shows."""
+    Each is drawn once, by `spread`, a `map`, and kept with a hash of all that it shows."""
     figures, new = {}, []
     for name, each in drawings.items():
         path = evidence.directory / PICTURES / f"{name}.svg"
@@ -220,8 +217,7 @@ def kept(path: Path, drawing: Drawing, data: Any) -> dict[str, str] | None:
 
 
 def drawn(new: tuple[Path, Drawing, Any]) -> dict[str, str]:
-    """Draw a figure and write it to its SVG file, with its caption as description: picture and
-    caption.
+    """Draw a figure and write it to its SVG file: picture and caption.
 
     Where it can't be drawn or written, the reason as a "gap"."""
     path, drawing, data = new

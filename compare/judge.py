@@ -33,8 +33,7 @@ _computed = functools.cache(lambda function, *args, **options: function(*args, *
 
 
 def theory(function: Callable[P, R], *args: P.args, **options: P.kwargs) -> R:
-    """The value of a function of `analytic` at hashable arguments, from a cache that `judge`
-    empties.
+    """The value of a function of `analytic` at hashable arguments, from a cache.
 
     Name the function through its module where it is called, as in ``theory(pulsation.slip_onset, p,
     f)``: then a theory that was exchanged is the one that is asked."""

@@ -54,11 +54,9 @@ def characteristic(
 
 
 def regions(p: Parameters, axes: Axes | None = None, *, equal: bool = False) -> Axes:
-    """A map of which cases have a stationary solution, over the friction of the wall, or of both,
-    and the flow.
+    """A map of which cases have a stationary solution, over friction and flow.
 
-    As Figs. 7 and 8 of the paper, with the other parameters of the set. The title warns as that of
-    `characteristic`."""
+    As Figs. 7 and 8 of the paper, of this set. The title warns as that of `characteristic`."""
     axes = _given_or_new(axes)
     thresholds.regions(axes, p, equal)
     style.legend(axes, loc="upper right")
@@ -67,8 +65,7 @@ def regions(p: Parameters, axes: Axes | None = None, *, equal: bool = False) -> 
 
 
 def figure(name: str, p: Parameters) -> Figure:
-    """A figure of the paper, or beyond it, of a set: "fig-9", "unloading", as `dualball figures`
-    names them.
+    """A figure of a set, of the paper or beyond: "fig-9", as `dualball figures` names them.
 
     Raises `InputError` for an unknown name, and for a figure of which the set has nothing to show.
     """
@@ -115,8 +112,7 @@ def motion(run: Trajectory | xarray.Dataset, *names: str, axes: Axes | None = No
 
 
 def basins(of: Basins | str | Path, axes: Axes | None = None) -> Axes:
-    """A map of where balls end that start on a plane of states, from the file of `dualball basins`,
-    or what it holds.
+    """A map of where balls end, from the file of `dualball basins`, or what it holds.
 
     Raises `StorageError` for a file that isn't one."""
     axes = _given_or_new(axes)

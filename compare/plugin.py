@@ -1,5 +1,4 @@
-"""The plugin for pytest: exact cases as tests of an engine, and fixtures for tests of one's own
-scene.
+"""The plugin for pytest: exact cases as tests of an engine, fixtures for one's own scene.
 
 ``pytest --dualball-engine mypkg.adapter`` runs the cases, and nothing else unless files are named.
 An entry point loads this in every run of pytest where dualball is installed: nothing but pytest is

@@ -23,8 +23,7 @@ def lasting_cases(p: Parameters) -> set[Case]:
 
 
 def case_of(m: Measurement) -> Case:
-    """The case of the state that was measured; two cases in which a contact carries nothing count
-    as one.
+    """The case of the state that was measured; contacts that carry nothing count as none.
 
     SR is counted as NR, with an unloaded floor, and RN as RS, with an unloaded wall."""
     case = physical_case(m.case())

@@ -1,8 +1,6 @@
-"""Assertions for tests of one's own scene: does the ball settle where it should, does it move as it
-should?
+"""Assertions for one's own scene: does the ball settle and move as it should?
 
-Of one's own motion no more is needed than times and omega_c: arrays, a CSV file, or an HDF5 file of
-any program."""
+One's own motion: times and omega_c, as arrays, a CSV file, or any program's HDF5 file."""
 
 from __future__ import annotations
 
@@ -94,8 +92,7 @@ Source = (
 
 
 def read(source: Source, name: str = "") -> Series:
-    """A motion from a trajectory, a file, arrays by name of which one is ``time``, or the pair
-    (time, omega_c).
+    """A motion from a trajectory, a file, arrays by name with ``time``, or (time, omega_c).
 
     Files are dualball's own, other HDF5 files with datasets of such names, or CSV with a head of
     such names; without one its columns are time and omega_c. `name` is what errors call it. Raises
@@ -228,11 +225,9 @@ def _rms(values: Array) -> float:
 def assert_tracks(
     mine: Source, reference: Source, *, quantity: str = "omega_c", rms: float
 ) -> None:
-    """Assert that a motion follows a reference, as `analytic.simulate` gives it; both are what
-    `read` takes.
+    """Assert that a motion follows a reference; both are what `read` takes.
 
-    The root mean square of the difference, divided by the largest value of the reference, must not
-    exceed `rms`.
+    The root mean square of the difference must not exceed `rms` of the largest value.
 
     Raises
     ------
@@ -273,8 +268,7 @@ def assert_settles(
     case: Case | str | None = None,
     rtol: float,
 ) -> None:
-    """Assert that a ball settles in a stationary state of theory: of a case, or in any but NS,
-    which sinks.
+    """Assert that a ball settles in a stationary state: of a case, or in any but NS.
 
     In the last quarter of the motion omega_c must stay within `rtol`, relative, of the state's.
     That doesn't tell apart the states that go round with the fluid (RR, NR, NS).

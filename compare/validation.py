@@ -48,8 +48,7 @@ def validate(
     announce: Announce = lambda verdict: None,
     report: bool = True,
 ) -> list[Verdict]:
-    """Measure with an engine and judge claims on what was measured; store runs, measurements,
-    summary and report.
+    """Measure with an engine and judge claims; store runs, measurements, summary, report.
 
     What the directory holds already is not measured again. A claim is judged as soon as its
     measurements are there.
@@ -216,8 +215,7 @@ def judge(
 def judge_stored(
     directory: str | Path, claims: Sequence[str] | None = None, workers: int = 0
 ) -> list[Verdict]:
-    """Judge the measurements of the last validation in a directory again, and write summary and
-    report anew.
+    """Judge the measurements of a directory again, and write summary and report anew.
 
     On so many processes; 0 is this one. Raises `StorageError` if a file is missing, damaged, or was
     changed; `InputError` for an unknown claim."""
@@ -295,8 +293,7 @@ def write(
     known: Mapping[str, Verdict],
     over: Spread | None,
 ) -> list[Verdict]:
-    """Judge what isn't known yet, and write the summary, and the report with what is to draw
-    figures, if anything.
+    """Judge what isn't known yet, and write the summary, and the report if it is to be.
 
     Return the verdicts on all claims."""
     verdicts = [known.get(claim.id) or full_verdict(claim, records) for claim in CLAIMS]

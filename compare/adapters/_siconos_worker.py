@@ -118,8 +118,7 @@ class Scene:
 
 
 class TurningBall(kernel.LagrangianDS):  # type: ignore[misc]
-    """A free ball in axes that turn with it: M dv/dt + M Omega x v = F for its velocity and its
-    spin.
+    """A free ball in axes that turn with it: M dv/dt + M Omega x v = F for velocity and spin.
 
     Coordinates are -h, the way along the wall, y, and three that nothing depends on; axes outward,
     along and up. Omega = (0, 0, v_along/(R - h))."""

@@ -60,8 +60,7 @@ class Library:
 def against(
     place: Any, velocity: Any, spin: Any, ahead: float, R: float, r: float
 ) -> tuple[float, float]:
-    """Surface velocity (inwards, up), m/s, that makes a tangent plane act like the cylinder during
-    a step.
+    """Surface velocity (inwards, up), m/s, that makes a tangent plane act like the cylinder.
 
     What is at rest against it is so against the cylinder `ahead` s later, when velocities are where
     the place is now. By then the normal has turned by ahead Omega: of the velocity Omega R along

@@ -90,8 +90,7 @@ class Bodies(Free):
 class Lawful(Bodies):
     """Rigid contacts under Coulomb's law; of a cylinder a piece of wall that goes with the body.
 
-    An impact takes two steps, and what bore a body until then may let go in the first; so steps are
-    short round it."""
+    An impact takes two steps, in which what bore a body may let go: steps are short round it."""
 
     FEATURES = (*FEATURES, "restitution")
 
@@ -156,8 +155,7 @@ def pairs(spec: Any, scene: Scene) -> Iterator[tuple[str, Any]]:
 
 
 def studied(spec: Any, scene: Scene, timestep: float) -> None:
-    """Set an elliptic cone, stiff friction, and normal rows soft and slow enough for blocks on four
-    points.
+    """Set an elliptic cone, stiff friction, and normal rows soft enough for blocks on four points.
 
     b_f h is a tenth, so that contacts don't hover at 2 m/s; impratio 1e4 leaves a creep of some
     micrometres a second."""

@@ -1,5 +1,4 @@
-"""PyBullet: projected Gauss-Seidel on the velocities of a multibody, contacts rigid within
-tolerances.
+"""PyBullet: projected Gauss-Seidel on velocities of a multibody, contacts rigid within tolerances.
 
 Traps: its margins are absolute lengths and its solver stops at an absolute residual, both made for
 things the size of a man, but where a length unit is so small that things move by 0.4 of it in a

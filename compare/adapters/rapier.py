@@ -1,5 +1,4 @@
-"""Rapier: projected Gauss-Seidel in substeps with contacts as overdamped springs, in single
-precision.
+"""Rapier: projected Gauss-Seidel in substeps, contacts as overdamped springs, single precision.
 
 Along which directions friction acts it doesn't tell.
 

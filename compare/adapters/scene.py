@@ -1,5 +1,4 @@
-"""A rigid body, or one on another, in plain geometry, and what acts on it, as data: what an engine
-is asked to build.
+"""A body in plain geometry, or one on another, and what acts on it: what an engine is to build.
 
 SI units, world axes with z up. Contacts are rigid, friction is Coulomb's with one coefficient for
 stick and slip, and impacts are plastic unless a surface has a restitution. The body's friction is

@@ -1,5 +1,4 @@
-"""Siconos: Moreau's time stepping by a theta method, rigid contacts with Coulomb's cone, impacts by
-Newton's law.
+"""Siconos: Moreau's time stepping by a theta method, rigid contacts with Coulomb's cone.
 
 It has no wheel, and where a distribution packages it, it belongs to the system's Python. There it
 runs, a process for each run (`_siconos_worker.py`), which takes a step a line.

@@ -93,8 +93,7 @@ def simulate(
     Where it breaks down, the header says why. Where its adapter doesn't tell what contacts carry,
     forces are nan, and cases are told by gaps and slip alone.
 
-    Forces of a sample are those of the step that begins there, gaps of touching contacts the
-    engine's own.
+    Forces of a sample are those of the step that begins there, gaps the engine's own.
 
     Raises
     ------

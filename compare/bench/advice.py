@@ -145,8 +145,7 @@ def best_change(
     harm: Mapping[str, float],
     calm: Callable[[Any], bool],
 ) -> tuple[Change | None, dict[str, Array]]:
-    """The first option, in its mildest value, that makes all contacts good, or else the one that
-    helps most.
+    """The first option, in its mildest value, that makes all contacts good, or helps most.
 
     Also the harm that is left then. `pair` is the worst one, `members` are its contacts, `harm` is
     its own; `calm` says whether a changed model settles as well."""

@@ -82,11 +82,9 @@ class ContactCase(Scene):
         return float(off.max())
 
     def touching(self, states: Array) -> tuple[Array, Array]:
-        """Gap (m) and slip speed (m/s) of states (n, 9 or 18) at each contact, (n, contacts); only
-        spheres turn.
+        """Gap (m) and slip speed (m/s) of states at each contact, (n, contacts); only spheres turn.
 
-        Where a soft contact lets the body sink in, it touches halfway between its own surface and
-        the other."""
+        A soft contact touches halfway between the body's own surface and the other."""
         body = self.bodies[-1]
         position, velocity, spin = np.split(states[:, -9:], 3, axis=1)
         gaps, slips = [np.zeros((0, len(states)))], [np.zeros((0, len(states)))]
@@ -159,8 +157,7 @@ def reach(body: Body, normal: Array) -> Array:
 
 
 def read(path: Path) -> ContactCase:
-    """A case from a file that `dualball cases -o` wrote, of this version or one before; without its
-    wrong answers.
+    """A case from a file that `dualball cases -o` wrote; without its wrong answers.
 
     Raises
     ------

@@ -51,11 +51,9 @@ def closed_form(
     under: Mapping[str, Any] | None = None,
     **forces: Any,
 ) -> ContactCase:
-    """A case whose course is a closed form, sampled 25 times; `wrong` are other constants of the
-    course.
+    """A case whose course is a closed form; `wrong` are other constants of the course.
 
-    `contacts` are the letters of `ContactCase.contacts`, with the times at which they change, s,
-    between them."""
+    `contacts` are letters of `ContactCase.contacts`, between them when they change, s."""
     times: Array = np.arange(1.0, 26.0) * (until / 25)
     letters, changes = contacts[::2], contacts[1::2]
 
@@ -306,8 +304,7 @@ def _groove(angle: float, mu: float) -> tuple[Surface, Surface]:
 
 
 def _descends(t: Array, angle: float, lever: float = 2 * J, mu: float = 9.0) -> _Motion:
-    """A body goes down a groove at g sin/(1 + j/sin^2 45) if it rolls, faster if it slips; a block
-    can't roll.
+    """A body goes down a groove at g sin/(1 + j/sin^2 45) if it rolls, faster if it slips.
 
     Each plane of the groove carries m g cos/sqrt(2)."""
     way, normal = slope(angle)

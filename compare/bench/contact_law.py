@@ -1,5 +1,4 @@
-"""The law of MuJoCo's contacts, for those of any settled model: depth, creep, hovering, and small
-motions.
+"""The law of MuJoCo's contacts in any settled model: depth, creep, hovering, small motions.
 
 Formulas and their derivation: docs/forecast.md. The engine says where contacts are, what they
 carry, and how it estimates their inverse mass; the rest is computed from parameters, so that it can

@@ -1,5 +1,4 @@
-"""The set of exact cases, the study's ball among them, and all as files for engines that don't
-speak Python.
+"""The set of exact cases, the study's ball among them, and as files for any language.
 
 The ball's motion is that of `analytic.simulate`, event-driven, at its sharpest; its wrong answers
 are the motions of other parameters."""

@@ -1,5 +1,4 @@
-"""What the contacts of any MuJoCo model will do, beside what they measurably do, and what to
-change.
+"""What the contacts of a MuJoCo model will do, and measurably do, and what to change.
 
 The engine says what the contacts of a settled model carry. From that `compare.bench.contact_law`
 computes depth, creep and the rest; measured are the places of bodies before and after the next
@@ -47,8 +46,7 @@ SHOWN = 12
 
 @dataclass(frozen=True)
 class PairForecast:
-    """Two geoms in contact, at the worst of their contacts: what is predicted of them, and what was
-    measured.
+    """Two geoms in contact, at the worst of their contacts: predicted, and measured.
 
     If speeds still change, loads are means over the second in which the rest was measured. Of a
     pair that `moves`, as its bodies move on or lose contact, depth, creep and turning aren't
@@ -119,8 +117,7 @@ def forecast(
     depth: float | None = None,
     control: Control | None = None,
 ) -> Forecast:
-    """The forecast for a model as `settle` has left it; `data` is left at the end of what is
-    measured.
+    """The forecast for a model as `settle` has left it; `data` is left at its end.
 
     `creep` (m/s) and `depth` (m; by default a hundredth of a body's radius) are what passes for
     good; `control` is run before each step. Raises `InputError` if nothing touches,
@@ -155,8 +152,7 @@ def follow_advice(
     tell: Callable[[float], object] = float,
     **good: Any,
 ) -> tuple[Forecast, Forecast | None, Forecast | None]:
-    """Follow the advice and settle anew, for at most `limit` s: the forecast with what was found,
-    after it, and beyond.
+    """Follow the advice and settle anew, for at most `limit` s: forecasts before, after, beyond.
 
     The second forecast is that after the change, the third that with the remedy on top.
     What isn't advised isn't tried: None. The change is made in `model`. `tell` is called with the

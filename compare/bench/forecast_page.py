@@ -124,11 +124,9 @@ def _number(value: float, factor: float = 1, endless: str = "any") -> str:
 
 
 def tables(f: Forecast, after: Forecast | None = None, held: Forecast | None = None) -> list[Table]:
-    """Tables of the worst pairs in contact: at rest and in motion; what was measured is called
-    found.
+    """Tables of the worst pairs at rest and in motion; what was measured is called found.
 
-    Then what the change was made for, once it was made, and the creep with the remedy, if these
-    forecasts are given."""
+    Then what the change was made for, and the creep with the remedy, if these are given."""
     rest = [
         [
             "pair",

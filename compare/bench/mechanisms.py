@@ -1,5 +1,4 @@
-"""Exact cases of version 2: on feet, one body on another, on a belt, on a joint, on an edge or a
-rim, after a bounce.
+"""Exact cases of version 2: on feet, bodies, a belt, a joint, an edge or a rim, after a bounce.
 
 As in `compare.bench.closed_forms`: courses are functions of time and of the constants that a wrong
 engine or theory would have otherwise, each under its case. That of the tripod and of what it stands
@@ -79,8 +78,7 @@ def integrated(rates: Callable[[float, Array], Array], start: Array, t: Array) -
     until=0.3, scales=(0.1, 0.5, 5.0), contacts=("S",), source=BALANCE)
 def tripod(t: Array, mu: float = 0.3, height: float = _FOOT + _DOWN, share: float = 1.0,
            start: tuple[float, float] = (0.0, 10.0), pyramid: bool = False) -> _Motion:
-    """Position, velocity and spin of a tripod of 1 kg each foot of which bears what keeps it from
-    tilting.
+    """Position, velocity and spin of a tripod whose feet bear what keeps it from tilting.
 
     At the `start` it goes at 1.5 m/s, so many degrees from the x axis, and turns at so many rad/s.
     The loads N of three feet at p follow from sum N = m g and the two moments of weight and
@@ -127,8 +125,7 @@ _STOP = _MEET + (_SPEED - _ABOVE * G * _MEET) / (_BELOW * G)
     source="Coulomb's law and Newton's third: m mu g drives the plank, mu' (m + M) g brakes it",
     under=_plate(_HEAVIER, 0.0, _PLANK), between=_ABOVE)
 def _dragged(t: Array, above: float = _ABOVE, below: float = _BELOW, load: float = 1.0) -> _Motion:
-    """A block that slides on a plank slows by mu g and draws the plank until both go together, then
-    stop.
+    """A block that slides on a plank draws it until both go together, then stop.
 
     `load` is what of the block's weight the floor bears under the plank."""
     a = max(above * G - below * (_HEAVIER + load) * G, 0.0) / _HEAVIER
@@ -230,8 +227,7 @@ _KEPT = 1 - _ARM**2 / _MOMENT_OF_EDGE * (1 - math.cos(2 * _ALPHA))
     source="Housner, Bull. Seismol. Soc. Am. 53 (1963): a pendulum upside down, momentum about the "
            "new edge")
 def _rocks(t: Array, kept: float = _KEPT, moment: float = _MOMENT_OF_EDGE) -> _Motion:
-    """A pendulum upside down about the edge it stands on: from rest at an angle to upright and,
-    slower, beyond.
+    """A pendulum upside down about an edge: from rest at an angle to upright and beyond.
 
     With the angle psi of the centre from straight below the edge, psi = pi - alpha + lean, it is
     sin(psi/2) = k sn(K - p t, k), p^2 = m g arm/moment. Each impact on the other edge leaves `kept`
@@ -299,8 +295,7 @@ _ACROSS = _RADIUS**2 / 4 + _THICK**2 / 3
     until=1.2, scales=(2.0, 1.0, 5.0), contacts=("T",),
     source="balances of momentum and angular momentum in axes that go round with the disc")
 def _rolls_round(t: Array, ring: float = 0.5, half: float = _THICK, share: float = 1.0) -> _Motion:
-    """Steady rolling on the rim, round a circle at the rate Omega, the disc's axis at `lean` from
-    the vertical.
+    """Steady rolling on the rim, round a circle at the rate Omega, the axis at `lean`.
 
     The lowest point of the rim is at c = (c_r, c_z) from the centre, outwards and up. With the spin
     s about the axis it is at rest if the centre goes round at rho = (w_r c_z - w_z c_r)/Omega, w =

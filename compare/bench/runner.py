@@ -1,5 +1,4 @@
-"""An engine on exact cases, in a process of its own: what breaks, hangs or diverges loses a case,
-not the run.
+"""An engine on exact cases, in a process of its own: what breaks or hangs loses a case.
 
 An engine is anything with three functions, a module most simply:
 
@@ -119,8 +118,7 @@ class Result:
 def run(
     case: ContactCase, engine: Any, steps: Sequence[float] | None = None, limit: float = LIMIT
 ) -> Result:
-    """Run an engine on one case: ``engine`` is a module or its name, ``module:object``, or a
-    picklable object.
+    """Run an engine on one case: a module or its name, ``module:object``, or an object.
 
     ``limit`` is the longest time for one step's run, s. Raises `InputError` if the engine can't be
     used, or for a step that is none."""
@@ -304,8 +302,7 @@ def _one_line(error: Exception) -> str:
 
 
 def serve_engine(handle: int) -> None:
-    """Run in the process of an engine: receive the engine, then cases; send the states that it
-    makes of each.
+    """Run in the process of an engine: receive the engine, then cases; send their states.
 
     It ends with the process that started it."""
 

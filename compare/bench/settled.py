@@ -238,8 +238,7 @@ def _collapsed(model: Any, first: Any, data: Any) -> Iterator[str]:
 
 
 def mean_velocities(model: Any, data: Any, step: Advance, time: float = WINDOW) -> Array:
-    """Advance by a window; the mean velocities of bodies in it, (nbody, 6): of centres, m/s, and
-    turning, rad/s.
+    """Advance by a window; mean velocities of bodies, (nbody, 6): m/s and rad/s.
 
     Raises `UnsettledError` if the model diverges."""
     mujoco.mj_forward(model, data)

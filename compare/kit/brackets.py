@@ -85,8 +85,7 @@ class Reply:
 
 
 def narrow(runner: Runner, searches: Sequence[Search], careful: bool = True) -> list[Bracket]:
-    """Narrow every search down to its width, or as far as runs show it, all of them together, round
-    by round.
+    """Narrow every search down to its width, or as far as runs show it, round by round.
 
     A round asks inside every bracket, and once more, for longer, where the run doesn't show the
     answer; one that breaks down shows none. The new bracket is from the last yes before the first

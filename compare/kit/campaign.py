@@ -1,5 +1,4 @@
-"""Many runs on an executor: each task is carried out once; results do not depend on order or number
-of workers.
+"""Many runs on an executor: each is carried out once; results don't depend on the workers.
 
 The runs of a batch are one file, ``LABEL-ID.h5``, in which the name of each is `Task.key`, the hash
 of all that determines it. A file appears only when it is whole, so the directory itself is the
@@ -86,8 +85,7 @@ class Failure:
 
 @dataclass
 class Campaign:
-    """A directory of runs, locked against other programs, and the workers that fill it; a context
-    manager.
+    """A directory of runs, locked against other programs, and the workers that fill it.
 
     Parameters
     ----------
@@ -175,8 +173,7 @@ class Campaign:
         return self._read[key]
 
     def _keep_in_memory(self, runs: Mapping[str, Trajectory]) -> None:
-        """Keep runs in memory, and forget the earliest of the others while there are more than
-        `READ` samples.
+        """Keep runs in memory, and forget the earliest while there are more than `READ` samples.
 
         What isn't stored is before it is forgotten, all at once."""
         others = [key for key in self._read if key not in runs]

@@ -58,8 +58,7 @@ def collect(
     workers: int = 0,
     progress: Callable[[float], None] = lambda done: None,
 ) -> int:
-    """Gather all runs of a directory, whole ones and failed ones, ordered by what varies; return
-    their number.
+    """Gather all runs of a directory, ordered by what varies; return their number.
 
     One that is stored twice is taken once. So many processes read the files; 0 is this one.
     `progress` is called with the share of them that is read.

@@ -141,8 +141,7 @@ SUFFIXES = (".svg", ".pdf", ".png")
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a figure to a file, in the format that its name says, one of `SUFFIXES`; equal figures
-    make equal files.
+    """Write a figure to a file, as its name says: `SUFFIXES`; equal figures make equal files.
 
     Raises `StorageError` if it can't be written."""
     suffix = path.suffix.lower()

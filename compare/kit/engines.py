@@ -1,8 +1,6 @@
-"""The engines on trial and the simulators beside them, one record each: all that the rest of the
-program knows of them.
+"""The engines on trial and simulators beside them: all that the rest of the program knows.
 
-To add an engine, add a record. It is named in tasks and files by `Engine.name`; nothing else
-compares names."""
+To add an engine, add a record. It is named by `Engine.name`; nothing compares names."""
 
 from __future__ import annotations
 
@@ -123,8 +121,7 @@ STUDY_SLIP = 2.0
 def plain(step: float) -> ContactSettings:
     """MuJoCo's own contacts for a step in s, as they suit a ball that slides on the roughest floor.
 
-    The implicit integrator damps the swinging of a spinning ball on the wall; with Euler's it grows
-    at steps of 2 ms."""
+    The implicit integrator damps the swinging on the wall; with Euler's it grows at 2 ms."""
     rough = Parameters.named("reference").replace(mu=1.0, eta=0.0)
     return ContactSettings.for_problem(rough, step, STUDY_SLIP, integrator="implicit")
 

@@ -1,5 +1,4 @@
-"""How much each level measures: which parameter sets there are, and of every protocol step counts,
-durations and grids.
+"""How much each level measures: parameter sets; of protocols step counts, durations, grids.
 
 An engine other than the one on trial, with time steps of its own, measures as much as the quick
 level at every level, but for what `OWN_STEPS` says, and looks where the one on trial found

@@ -15,8 +15,7 @@ if sys.platform != "win32":
 
 
 class Lock:
-    """Held until `release` or the end of the process, whatever ends it; a file in the directory
-    says by whom.
+    """Held until `release` or the end of the process; a file in the directory says by whom.
 
     Raises `StorageError`, which names the owner, while another has it. On Windows there is none."""
 

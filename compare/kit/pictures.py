@@ -1,5 +1,4 @@
-"""Figures as SVG that a page can play with: series switched on and off, values under the pointer,
-zoom.
+"""Figures as SVG that a page can play with: series switched, values under the pointer, zoom.
 
 matplotlib draws the figure, once. What bears a label is written as a series of that name, and axes
 say how a place in the picture becomes a value; `templates/figure.js` reads both. Where no script
@@ -122,8 +121,7 @@ def plain(label: str) -> str:
 
 
 def _scales(figure: Figure, axes: Axes) -> dict[str, Any]:
-    """The box of axes, and of each axis its label, its kind, and (a, b): panels in a row or column
-    share one label.
+    """The box of axes, and of each axis its label, its kind, and (a, b).
 
     a + b times the place is the value, or its logarithm."""
     width, height = 72 * figure.get_size_inches()

@@ -190,8 +190,7 @@ def run(jobs: Sequence[Job]) -> Iterator[tuple[Job, Records | Exception]]:
 def carry_out(job: Job, before: Records) -> Records:
     """What a protocol measures after others; what is kept is not measured again.
 
-    Its measurement file is the record of what is done: once it is there, only the runs that a
-    figure draws are kept.
+    Once its measurement file is there, only the runs that a figure draws are kept.
 
     Raises `StorageError` where measurements can't be read or written, or are another engine's."""
     path, protocol, entry = job.file, job.protocol, PLAN[job.protocol.name]

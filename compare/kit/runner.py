@@ -52,8 +52,7 @@ class Runner:
     ) -> Task:
         """The task of a run by the runner's engine with a time step in s, in the studies' settings.
 
-        One that goes on from another begins on floor and wall, into which contacts may have let it
-        sink."""
+        One that goes on from another begins on floor and wall, not sunk into them."""
         x = np.array(x0, float)
         # y, and h where it is given
         x[[0, 6][: len(x) // 4]] = np.maximum(x[[0, 6][: len(x) // 4]], 0.0)

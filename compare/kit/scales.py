@@ -14,11 +14,9 @@ def time_unit(p: Parameters) -> float:
 
 
 def dragged_speed(p: Parameters) -> float:
-    """A speed relative to the fluid, m s-1, at which drag is about as large as the weight, or
-    larger.
+    """A speed relative to the fluid, m s-1, at which drag is at least about the weight.
 
-    By Stokes' law g/c. In thin fluids with another law that is far too fast: no more than 20 sqrt(g
-    R) then."""
+    By Stokes' law g/c. With another law that is far too fast: at most 20 sqrt(g R) then."""
     return p.g / p.c if p.drag == STOKES else min(p.g / p.c, 20 * math.sqrt(p.g * p.R))
 
 

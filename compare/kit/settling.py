@@ -1,5 +1,4 @@
-"""Runs until they are settled, by their own drift; what a settled state is, and how sure each of
-its numbers is.
+"""Runs until they are settled, by their drift; what a settled state is, and how sure it is.
 
 The oscillation of a ball on the wall dies out slowly or, while it sinks, not at all; a mean over a
 tapered window is free of it. Three overlapping windows show how far the mean still drifts."""
@@ -252,11 +251,9 @@ def settled_readings(runner: Runner, protocol: str, starts: Sequence[Start]) -> 
 
 
 def duration(p: Parameters, span: float = SPAN, steps: int = 2048) -> float:
-    """Length of a round, s: at least 8 turns of the fluid, in whose rhythm a slipping ball on the
-    wall swings.
+    """Length of a round, s: at least 8 turns of the fluid, in whose rhythm balls swing.
 
-    A whole multiple of so many coarse time steps: chosen when alike runs shared a batch, as is
-    `rounded_duration`."""
+    A multiple of so many coarse steps: for batches of alike runs, as is `rounded_duration`."""
     unit = steps * coarse_step(p)
     turns = 8 * 2 * math.pi / abs(p.omega_0) if p.omega_0 else 0.0
     return unit * math.ceil(max(span / p.c, turns) / unit)

@@ -61,8 +61,7 @@ def estimate(value: float, size: float = 1.0, **causes: float) -> Estimate:
 
 
 def plain(value: Any) -> Any:
-    """Nested data as JSON holds it: dataclasses as mappings, arrays as lists, a case by its name,
-    complex as a pair.
+    """Nested data as JSON holds it: dataclasses as mappings, a case by name, complex as a pair.
 
     Of numbers that are not finite None is left."""
     if is_dataclass(value):
@@ -86,8 +85,7 @@ def taper(length: int) -> Array:
 
 
 def steady_mean(values: Array, length: int, slowest: float = 0.0) -> tuple[Array, Array]:
-    """Mean of rows (k, n) over their last `length` samples, tapered, and how far it may be from its
-    limit; both (k,).
+    """Mean of rows (k, n) over the last `length` samples, tapered, and its drift; both (k,).
 
     From three windows, each a quarter of its length later than the one before: what is left of an
     approach by a constant ratio, plus the last change itself. Of a time constant of `slowest`
@@ -133,8 +131,7 @@ def hops(run: Trajectory, share: float = 1 / 3) -> bool:
 
 
 def hops_on(y: Array, R: float) -> bool:
-    """Whether heights at samples are those of hops: twice near the floor, and high above it in
-    between.
+    """Whether heights are those of hops: twice near the floor, and high above in between.
 
     High is more than half as high as the highest sample, near less than a fifth: every tenth sample
     of a hop is so low. What stays below 1e-4 R doesn't hop."""
@@ -163,8 +160,7 @@ def slope_error(x: Array, degree: int) -> float:
 def straight_line(
     x: npt.ArrayLike, y: npt.ArrayLike, noise: npt.ArrayLike
 ) -> tuple[Estimate, Estimate]:
-    """Zero and slope of the line through points x, y (n,) whose y have the standard uncertainties
-    `noise`.
+    """Zero and slope of the line through points x, y (n,), y uncertain by `noise`.
 
     The uncertainties are those of the points carried over, and the scatter about the line where
     that is larger."""
@@ -187,8 +183,7 @@ def straight_line(
 
 
 def zero_and_slope(x: Array, y: Array, noise: Array) -> tuple[Estimate, Estimate]:
-    """Zero of the polynomial through all points x, y (n,), and its slope there; nan without one
-    zero between them.
+    """Zero of the polynomial through points x, y (n,), and its slope; nan unless there is one.
 
     Uncertain by the noise of every y, and a third of what the last degree changes."""
 
@@ -230,8 +225,7 @@ def initial_slope(where: Array, values: Sequence[Estimate]) -> Estimate:
 def extrapolated_maximum(
     where: Array, values: Sequence[Estimate], others: Array | None = None
 ) -> Estimate:
-    """The maximum of the place as a function of a quantity, whose value nearest to it is the first;
-    nan without one.
+    """The maximum of the place over a quantity, the nearest value first; nan without one.
 
     Or what another quantity is there, with its values `others` at the places."""
 
@@ -248,8 +242,7 @@ def extrapolated_maximum(
 
 
 def _extrapolated(found: Callable[[Array, int], float], points: Sequence[Estimate]) -> Estimate:
-    """What is found(values, n) from all n values, with an uncertainty by its convergence with n and
-    their noise.
+    """What is found(values, n) from all n, uncertain by its convergence and their noise.
 
     It is made without the last two points, without the last, and with all. Its changes are
     continued as a geometric series with the larger ratio of any two, at most 1, from the last
@@ -279,8 +272,7 @@ def _real_roots(polynomial: Polynomial) -> list[float]:
 
 
 def propagator(record: Array, lag: int) -> Array:
-    """P (d, d) with record[k + lag] = P record[k] in least squares, of a record (n, d, d) of a
-    linear motion.
+    """P (d, d) with record[k + lag] = P record[k] in least squares, of a record (n, d, d).
 
     The columns of record[k] are d independent motions at sample k; rows should be scaled to be of
     like size."""
@@ -292,8 +284,7 @@ def propagator(record: Array, lag: int) -> Array:
 def exponents(
     at: Callable[[int], Array], interval: float, longest: int
 ) -> npt.NDArray[np.complex128]:
-    """All exponents (d,) in s-1 of a linear motion whose propagator for k sample intervals is
-    at(k), (d, d).
+    """All exponents (d,), s-1, of a linear motion with the propagator at(k), (d, d).
 
     Each is measured at lags that double up to its own time constant or `longest`: a longer lag
     shows slow exponents more sharply, and fast motions have decayed by then."""

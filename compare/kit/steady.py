@@ -1,5 +1,4 @@
-"""What a run comes to, and how far it may still be from there: a motion that hasn't settled says
-so.
+"""What a run comes to, and how far it may be from there: what hasn't settled says so.
 
 A mean over the last quarter is free of swings, and its drift tells how far it has to go, as long as
 some of the way is seen. Of a ball that takes minutes seconds show almost none: no limit is taken to

@@ -1,5 +1,4 @@
-"""Motions of which there are two: with one time step and with a shorter one, whose difference is
-the error.
+"""Motions with one time step and with a shorter one, whose difference is the error.
 
 Trials, of any length; and records of a few steps: polynomials through one give values and rates of
 change, whose uncertainty is what the step and the degree change."""

@@ -37,8 +37,7 @@ class Deviations:
 
 
 def sizes(checks: Iterable[Check]) -> dict[str, list[float]]:
-    """Sizes of deviations in standard uncertainties, by quantity; each number once, however many
-    claims ask for it.
+    """Sizes of deviations in standard uncertainties, by quantity; each number once.
 
     Of what has an uncertainty and a prediction; what only bounds is left out."""
     found = {}

@@ -39,8 +39,7 @@ AT_WALLS = (
 
 
 def rounded(value: float, off: float = 0.0, most: int = 4) -> str:
-    """A number as text: at most `most` digits, and beyond the third none that its relative error
-    `off` makes doubtful.
+    """A number as text: at most `most` digits, beyond the third none that `off` makes doubtful.
 
     With fewer than three what differs by half would look alike."""
     if not math.isfinite(value):

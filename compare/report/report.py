@@ -37,8 +37,7 @@ _OPTIONS = {Level.QUICK: " --quick", Level.DEFAULT: "", Level.FULL: " --full"}
 def write(
     evidence: Evidence, verdicts: Sequence[Verdict], summary: Summary, spread: Spread = map
 ) -> Path:
-    """Write ``summary.json`` and ``report.html`` into the evidence's results directory; return the
-    page's path.
+    """Write ``summary.json`` and ``report.html`` into the directory; return the page's path.
 
     Figures are drawn by `spread`, a `map`. Raises `model.StorageError` if it can't be written."""
     directory = evidence.directory

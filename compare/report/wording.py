@@ -90,8 +90,7 @@ def ranked(checks: Sequence[Check]) -> list[Check]:
 
 
 def findings(verdict: Verdict) -> dict[str, str]:
-    """What the numbers of a verdict come to, by heading: the largest deviation, and what error they
-    would notice.
+    """What a verdict's numbers come to: the largest deviation, what they would notice.
 
     The latter is given by quantity, and left out where only counts are compared."""
     if not verdict.checks:

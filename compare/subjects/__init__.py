@@ -1,5 +1,4 @@
-"""The subjects of the study: a folder each, with its `measure`, `claims` and `figures`, and a line
-here.
+"""The subjects of the study: a folder each with `measure`, `claims`, `figures`; and their order.
 
 To take one out, remove both."""
 

@@ -160,8 +160,7 @@ def table(
     justify: JustifyMethod = "right",
     **look: Any,
 ) -> Table:
-    """A table for the terminal; with `no_wrap` only its head and first column may take several
-    lines.
+    """A table for the terminal; with `no_wrap` only head and first column may be broken.
 
     `justify` is for all columns but the first, and those of words."""
     from rich import box

@@ -1,5 +1,4 @@
-"""Where the ball ends from each start of a plane of states: on a fine grid by theory, on a coarse
-one by MuJoCo.
+"""Where the ball ends from a plane of states: finely by theory, coarsely by MuJoCo.
 
 The two should differ only at the boundaries of basins, where the smallest error decides. What
 MuJoCo has run is kept."""
@@ -99,8 +98,7 @@ def basins(
     """Attractors after 10/c of starts on a plane of two state variables, across and up; all others
     as in `start`, or zero.
 
-    Raises `InputError` for an unknown variable, without drag (nothing settles), or where a ball
-    can't start."""
+    Raises `InputError` for an unknown variable, no drag, or an impossible start."""
     across, up = plane
     check_names((*start, across.name, up.name), VARIABLES, "state variable")
     if across.name == up.name:

@@ -1,5 +1,4 @@
-"""Motions that never settle: a ball that hops for ever, one that swings for ever, and whether
-others do.
+"""Motions that never settle: a ball that hops for ever, one that swings; do others?
 
 * A ball hops while the flow is lowered in held steps. The tops of its hops give period, height,
   orbit, and by what factor disturbances shrink from hop to hop; the flow at which hops would have
@@ -70,8 +69,7 @@ def hopping(
     protocol: str = "recurrent",
     divisors: tuple[int, int] = HOPS_DIVISORS,
 ) -> Measured:
-    """Period, orbit, height and the shrinking of disturbances at each flow, and where hopping would
-    begin.
+    """Period, orbit, height, shrinking of disturbances by flow, and where hopping begins.
 
     With the protocol "stepped" at the flow of the set only, by time stepping, in which slip begins
     and turns at whole steps only."""
@@ -179,11 +177,9 @@ def tops(run: Trajectory, start: float, end: float) -> Hops:
 
 
 def hop_map(states: Array, p: Parameters) -> tuple[float, State]:
-    """The map from hop to hop, linear in height, omega_c and slip_x, fitted to states (n, 8) at
-    tops.
+    """The map from hop to hop, linear in height, omega_c, slip_x, of states (n, 8) at tops.
 
-    The modulus of its largest eigenvalue, the factor by which disturbances grow or shrink; and its
-    fixed point."""
+    The modulus of its largest eigenvalue, by which disturbances grow; and its fixed point."""
     units = np.array([p.R, 1 / time_unit(p), math.sqrt(p.g * p.R) / p.r])
     z = states[:, [0, 2, 3]] / units
     changes = np.diff(z, axis=0)
@@ -292,8 +288,7 @@ def rebounding(runner: Runner, sets: Sets, records: Records) -> Measured:
 
 
 def death(etas: Sequence[float], factors: Sequence[Sequence[float]]) -> Estimate:
-    """The wall friction at which disturbances neither grow nor shrink, by lines through eta (n,)
-    and factors (n, 3).
+    """The wall friction at which disturbances don't change, by lines through eta (n,).
 
     Factors are those with the coarser step, with the finer one, and in a later part of the run with
     the finer one."""
@@ -304,11 +299,9 @@ def death(etas: Sequence[float], factors: Sequence[Sequence[float]]) -> Estimate
 
 
 def swing(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """Period, mean and size of the swing of omega_c, from its turning points, on a very rough
-    floor.
+    """Period, mean and size of the swing of omega_c, on a very rough floor.
 
-    With other steps than these the contact of the floor, which carries a hundredth of the weight,
-    opens and closes."""
+    With other steps the floor's contact, a hundredth of the weight, opens and closes."""
     p = sets["reference"].replace(mu=2.5, eta=0.38, c=1.0, omega_0=24.648)
     x0 = State(omega_c=22.39, slip_x=-0.03, slip_z=0.26).stacked()
     (result,) = carry_out(

@@ -138,8 +138,7 @@ OFF = 0.05
 
 
 def _nominal_friction(m: Measurement, off: float) -> dict[str, float]:
-    """Nominal friction of a meter, of whose tolerance `off` the measured ball is the worst case
-    (the best if off < 0).
+    """Nominal friction of a meter of which the ball is the worst case (best if off < 0).
 
     Less friction slips sooner; a rougher wall carries the ball sooner."""
     p = m.parameters

@@ -203,8 +203,7 @@ def names_within(axes: Axes) -> None:
 
 
 def draw_fall(of: Diagram) -> tuple[Figure, str]:
-    """A figure of a fall from the wall: height, velocities and slip, and 20 ms about the landing;
-    and its caption.
+    """A figure of a fall from the wall, and 20 ms about the landing; and its caption.
 
     The measured one with the finest step, if its file is there, else that of the event-driven
     simulation, whose flows are held for 5 s each: longer ones are sampled less densely."""

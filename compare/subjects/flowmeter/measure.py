@@ -1,5 +1,4 @@
-"""The flowmeter: slopes of its characteristic curve omega_c(omega_0), its loop of hysteresis,
-unloading and pushes.
+"""The flowmeter: slopes of its curve omega_c(omega_0), hysteresis, unloading, pushes.
 
 * For a slope only the flow is changed: at settled states, across the onset of slipping, and on
   average from there to unloading.
@@ -127,8 +126,7 @@ def _curves(name: str, p: Parameters, records: Records, most: int) -> Iterator[C
 
 
 def _slope(curve: Curve, states: Sequence[SteadyState]) -> Estimate | None:
-    """The slope of a curve, from its settled states; None where these are not of the cases that
-    belong.
+    """The slope of a curve from its settled states; None if these are of other cases.
 
     Between neighbours: central differences over two distances, so that the error of second order
     cancels. The jump: slope above minus slope below, each at the threshold itself, above by a cubic

@@ -98,8 +98,7 @@ def _motion(m: Measurement, leave_rolling: str = "slip-stability") -> Trajectory
 
 
 def _motion_either(m: Measurement) -> Trajectory:
-    """Theory's motion, or the one that rolls as long as forces admit it if that ends in the
-    measured case.
+    """Theory's motion, or the one that rolls as long as forces admit it, as measured.
 
     Where both agree with theory the internal force between floor and wall decides, which the state
     doesn't contain (docs/theory.md, 7)."""

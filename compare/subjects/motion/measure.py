@@ -99,8 +99,7 @@ class ContactLaw(NamedTuple):
 
 
 def laws(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """How far each law of contact is off at its worst in motions from rest, down the wall, and
-    along the floor.
+    """How far each law of contact is off at its worst in motions from three starts.
 
     And the speed at which balls sink in the middle of still fluid, off floor and wall."""
     tasks = []
@@ -198,8 +197,7 @@ def deviations(runs: Sequence[Trajectory]) -> dict[ContactLaw, float]:
 
 
 def _rows(run: Trajectory, contact: str) -> tuple[Array, ...]:
-    """Normal force, friction, and its difference from friction against the slip, divided by the
-    weight.
+    """Normal force, friction, its difference from that against the slip, in weights.
 
     Of the difference only what exceeds the turn of the slip from one sample to the next. Then slip
     speed divided by sqrt(g R), gap divided by R and the contact's letter, empty within 5 samples of
@@ -222,8 +220,7 @@ def _rows(run: Trajectory, contact: str) -> tuple[Array, ...]:
 
 
 def _sinking_speed(slow: Trajectory, fast: Trajectory) -> tuple[float, float]:
-    """v_y in m/s at which gravity and drag balance, of two falls that differ in speed, and their
-    duration in s.
+    """v_y, m/s, at which gravity and drag balance, from two falls; and their duration, s.
 
     With a drag proportional to speed, v' = (v_end - v)/T: the fall from rest gains (1 - q) v_end
     while the difference of the two shrinks to q of what it was."""
@@ -311,8 +308,7 @@ def field(runner: Runner, sets: Sets, records: Records) -> Measured:
 def _values(
     runner: Runner, case: Case, result: StepPairResult, centre: int
 ) -> tuple[Array, dict[str, Estimate]] | None:
-    """State (8,), rates and forces at the centre of a window; None if its case changes, or it
-    `turns_or_hovers`.
+    """State (8,), rates and forces amid a window; None if it changes case, or `turns_or_hovers`.
 
     They are extrapolated to a vanishing step, and uncertain by what this and the degree of the
     polynomials change, see `pairs.unlike`."""
@@ -492,8 +488,7 @@ def closing_error(runner: Runner, p: Parameters) -> float:
 
 
 def pieces(run: Trajectory, count: int) -> list[int]:
-    """Samples at which pieces of a run begin, about evenly spread, whose ends are away from changes
-    of case.
+    """Samples at which pieces of a run begin, evenly spread, away from changes of case.
 
     There the gap of an open contact exceeds 1e-4 R, for an unloaded one may hover; a slipping one
     slips by more than weight causes in the two steps by which landings may be late; a rolling one

@@ -113,8 +113,7 @@ def planes(runner: Runner, sets: Sets, records: Records) -> Measured:
 
 
 def added_points(seen: Sequence[tuple[Array, int]]) -> list[Array]:
-    """Points to measure next: midpoints between neighbours of other cases, at each kind of border,
-    and at rare cases.
+    """Points to measure next: midpoints at each kind of border, and at rare cases.
 
     A set of cases is rare if it was seen less than half as often as if all were seen equally often.
     """
@@ -149,8 +148,7 @@ SWINGS_ON = "on the border the ball swings on: quadratic drag of a slight lag da
 
 
 def borders(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """The state on the border between two basins, at flows between omega_02 and omega_04; not with
-    quadratic drag.
+    """The state on the border between two basins, at flows from omega_02 to omega_04.
 
     At the quick level the edge is followed to where it begins for the set with most drag alone,
     which settles soonest."""
@@ -255,8 +253,7 @@ def _on_floor_and_wall(x: Array) -> Array:
 
 
 def _search(runner: Runner, edge: Edge) -> Search:
-    """A search for the place on an edge's line at which the border is, first between the
-    attractors.
+    """A search for the place of the border on an edge's line.
 
     Later lines are a hundredth as long, and four times as long after each that missed the border.
     """
@@ -274,8 +271,7 @@ def _search(runner: Runner, edge: Edge) -> Search:
 
 
 def ends_slipping(run: Trajectory, edge: Edge) -> bool | None:
-    """Whether a run tends to slipping: by the direction in which it moves, or the rest state it is
-    extrapolated to.
+    """Whether a run tends to slipping: by its direction, or the rest state ahead.
 
     None while it moves by little, ever more slowly, and to neither attractor: then it isn't the
     border's instability that moves it."""
@@ -296,8 +292,7 @@ def ends_slipping(run: Trajectory, edge: Edge) -> bool | None:
 
 
 def _next_line(edge: Edge) -> Edge:
-    """The edge with the next line to search: from where the last two runs still agreed, along which
-    they part.
+    """The edge with the next line: from where the last two runs agreed, as they part.
 
     Together they are within 2e-3 of the distance of the attractors."""
     if edge.bracket is None:
@@ -315,8 +310,7 @@ def _next_line(edge: Edge) -> Edge:
 
 
 def _uncertainty(edge: Edge) -> Array:
-    """Standard uncertainty of the crossing (8,), by the last bracket's width and by how far more
-    lines would move it.
+    """Standard uncertainty of the crossing (8,), by the last bracket and further lines.
 
     They are taken to shrink as the last two did: together they are at least the last one, and at
     most ten of its size; and no less than the distance from the crossing to the next line, through
@@ -369,8 +363,7 @@ class BranchEnd:
 
 
 def birth(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """The drag at which the fold is born, where d omega_0/dA_y along the branch of SS is zero at
-    its end, A_y = 0.
+    """The drag at which the fold is born: d omega_0/dA_y of SS is zero at A_y = 0.
 
     The zero of the straight line through the slopes as a function of 1/c."""
     ranges = {}

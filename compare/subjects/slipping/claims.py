@@ -85,11 +85,9 @@ def _bounds(
     side: int = 0,
     from_rest: bool = False,
 ) -> tuple[Criterion, Criterion]:
-    """Criteria on the zero and the slope of gamma over the flow, which a bound of the paper
-    predicts.
+    """Criteria on the zero and slope of gamma over the flow, by a bound of the paper.
 
-    `side` is the sign of n_z where that makes another bound; `from_rest`: the zero is 0 or nearly
-    so."""
+    `side`: the sign of n_z, if that makes another bound; `from_rest`: the zero is about 0."""
     when = all_of(_along(arrow, by), given(n_z=side)) if side else _along(arrow, by)
     power = "_square" if by == "stationary" else ""
     size = (lambda m: m.parameters.g / m.parameters.R) if from_rest else None

@@ -23,8 +23,7 @@ MOTIONS = {"fig-4": (1.38, 3.4), "fig-5": (0.88, 0.17)}
 
 
 def draw(of: Diagram) -> tuple[Figure, str]:
-    """A figure of the slip at the wall over time, and of its path in the orthogonal plane (55); and
-    its caption.
+    """A figure of the slip at the wall over time, and of its path (55); and its caption.
 
     The motion is that of the event-driven simulation from the formal stationary state of NR."""
     check_thresholds(of.p)

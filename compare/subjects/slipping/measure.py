@@ -493,8 +493,7 @@ class Growths:
 
 
 def _growths(runner: Runner, rows: Sequence[Sequence[Push]]) -> list[Growths]:
-    """gamma for every row of pushes, from two sizes of slip with the shorter step, and one with the
-    longer one.
+    """gamma of pushes, from two sizes of slip with the short step, one with the long one.
 
     It is uncertain by what the step and the degree of the polynomials change."""
     tasks, divisor = [], runner.sampling.bounds_divisor

@@ -1,5 +1,4 @@
-"""Decay rates and frequencies: settled states are pushed a little, and the motion itself shows its
-whole spectrum.
+"""Decay rates and frequencies: settled states are pushed, and show their whole spectrum.
 
 Every active variable of a case is pushed by itself, up and down. Half the difference of the two
 runs, divided by the size of the push, is a column of D(t), which a linear motion turns into P D(t)
@@ -249,8 +248,7 @@ def chosen_states(
 
 
 def push_response(state: Pushed, size: float, runs: Sequence[Trajectory]) -> Array:
-    """The response D (n, d, d) of the active variables, in `units`, to pushes of one size, from the
-    runs of `tasks`.
+    """The response D (n, d, d) of active variables, in `units`, to pushes of one size.
 
     Only as long as the ball stays in the case and no variable is 0.4 away from the state, and
     without the first sample: forces build up then."""
@@ -277,8 +275,7 @@ def push_response(state: Pushed, size: float, runs: Sequence[Trajectory]) -> Arr
 def stays(run: Trajectory, case: Case) -> int:
     """For how many samples a run stays in a case; the first one counts, whatever it is in.
 
-    A ball on an almost unloaded floor may bounce by less than a contact's gap; it is in SR until
-    the floor lets go."""
+    A ball on an almost unloaded floor may bounce; it is in SR until the floor lets go."""
     left = run.case[1:] != case
     if case is Case.SR:
         left |= run.force_A[1:, 1] <= 0
@@ -295,8 +292,7 @@ class Spectrum(NamedTuple):
 
 
 def spectrum(state: Pushed, answers: Sequence[Array], step: float) -> Spectrum:
-    """Exponents with their standard uncertainties, from the answers to pushes of the
-    `Pushed.sizes`.
+    """Exponents with their uncertainties, from answers to pushes of the `Pushed.sizes`.
 
     They are extrapolated to a vanishing push, and to a vanishing step by second order. The
     uncertainty is made up of that correction, which exceeds the remainder even of first order; the
@@ -374,8 +370,7 @@ def _modes(state: Pushed, modes: Spectrum, step: float, row: Row) -> Measured:
 
 
 def _responses(state: Pushed, answers: Sequence[Array], row: Row) -> Iterator[Measurement]:
-    """Measurements of how each active variable follows a push of each, in `units`, a third of the
-    record later.
+    """How each active variable follows a push of each, a third of the record later.
 
     This shows the directions of the motions, not only their rates. It is extrapolated as `spectrum`
     does, to a vanishing push and step, and uncertain by what they change, by what two thirds of the
@@ -403,8 +398,7 @@ def _responses(state: Pushed, answers: Sequence[Array], row: Row) -> Iterator[Me
 
 
 def natural_size(rate: float, other: float, p: Parameters) -> float:
-    """Natural size in s-1 of the real or imaginary part of an exponent, of which `other` is the
-    other part.
+    """Natural size, s-1, of the real or imaginary part of an exponent; `other` is the other.
 
     Its own, or that of the exponent if it is none, or else that of free fall."""
     for size in (abs(rate), math.hypot(rate, other)):

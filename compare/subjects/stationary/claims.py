@@ -31,8 +31,7 @@ MOTION = ("omega_c", "slip_x", "slip_y", "slip_z", "v_y")
 
 
 def case(m: Measurement) -> float:
-    """The case that was detected, if theory lets a ball from that start settle there; LookupError
-    else.
+    """The case detected, if a ball from that start may settle there; else LookupError.
 
     From the floor it may settle to whatever attracts. High up on the wall it stays where the wall
     carries it, and sinks where not."""
@@ -168,8 +167,7 @@ def _slip_on_branch(m: Measurement) -> float:
 
 
 def _drag_at_birth(m: Measurement, equal: bool = False) -> float:
-    """The drag c in s-1 at which the fold is born at the eta of the set; that eta is proportional
-    to c^2.
+    """The drag c, s-1, at which the fold is born at eta, which is proportional to c^2.
 
     Where friction is `equal`, as in Fig. 8, to c^(2/3). Computed from that point at half the
     measured drag, since at the set's own there may be no fold for any eta below j."""

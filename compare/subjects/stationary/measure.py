@@ -1,5 +1,4 @@
-"""Settled states: where the ball ends from fixed starts at fixed flows, with the forces that
-mechanics determine.
+"""Settled states: where balls end from fixed starts at fixed flows, and their forces.
 
 Flows are the same multiples of sqrt(g/R) for every set. States are measured with the coarse step,
 and once more with half of it: what that changes belongs to their uncertainty, as does what

@@ -144,11 +144,9 @@ def regions(axes: Axes, p: Parameters, equal: bool, highest: float = 0.0) -> Non
 
 
 def _name(axes: Axes, where: npt.NDArray[np.bool_], eta: Array, omega_0: Array, kind: int) -> None:
-    """Write the cases at the widest spot of every connected region that has room for them, clear of
-    sections.
+    """Write the cases at the widest spot of every region with room for them.
 
-    The region with two stable motions is too narrow: its name stands at the top, with a line to
-    where it belongs."""
+    The region with two stable motions is narrow: its name stands at the top, with a line."""
     names = [
         flag.name.replace("SS_BEYOND_FOLD", "SS*") for flag in Exists if flag & kind and flag.name
     ]

@@ -64,8 +64,7 @@ class Passage(StrEnum):
 
 
 def lifts(end: Bracket) -> bool:
-    """Whether rolling at both points ends by lifting off the floor, not by slip, from the runs at
-    its end.
+    """Whether rolling at both points ends by lifting off, not by slip, by the runs at its end.
 
     Just below omega_03 the floor carries as little, but rolling may end there by slip at both
     contacts, which is as fast at one as at the other, and lasts. A ball that lifts off slips on the
@@ -89,8 +88,7 @@ def slip(speeds: Array, run: Trajectory, share: float = 0.1) -> float:
 
 
 def stays_rolling(run: Trajectory) -> bool | None:
-    """Whether a ball that rolls on both neither slips on the floor nor leaves it; None while slip
-    still dies out.
+    """Whether a ball that rolls on both goes on so; None while slip still dies out.
 
     None, too, while a ball that has slipped lags behind the fluid: it rolls more slowly than it is
     asked about; and while it touches the floor now and then: where friction alone could hold it, it
@@ -112,8 +110,7 @@ def stays_rolling(run: Trajectory) -> bool | None:
 
 
 def may_settle(run: Trajectory) -> bool | None:
-    """Whether a ball settles on the floor, judged after 10/c (None if not clear yet) or after 40/c
-    (True if not clear).
+    """Whether a ball settles on the floor, after 10/c (or None), or 40/c (True if not clear).
 
     Other motions still die out in a short run: with the usual share of change a ball just above a
     fold seemed to settle on some sets. (A tenth of it was chosen after that had been seen; a
@@ -128,8 +125,7 @@ def presses(run: Trajectory) -> bool:
 
 
 def settles(run: Trajectory, slowed: float = 0.2) -> bool | None:
-    """Whether a ball that slips on the floor comes to rest there, however slowly; None where the
-    run is too short.
+    """Whether a ball that slips comes to rest on the floor; None where a run is short.
 
     In the last tenth its speed must change by less than a share `slowed` of what it does in the
     tenth before the middle. On the way past a fold that it has missed the change falls at most like
@@ -244,8 +240,7 @@ class Findings:
         start: From | None = None,
         time: float = 1.0,
     ) -> tuple[Passage, Search]:
-        """A search that narrows a bracket by runs at held flows, `time` times as long as a question
-        of `ASKED` takes.
+        """A search by runs at held flows, `time` times as long as `ASKED` takes.
 
         They start as `STARTS` says, unless another start is given; for the end of slipping, from
         the state that the ball reached at the largest flow so far."""
@@ -306,8 +301,7 @@ class Findings:
 
 
 def _where_cases_change(runner: Runner, name: str, p: Parameters, records: Records) -> Findings:
-    """For each kind of change a bracket to search: the flows of settled states between which the
-    case changes.
+    """For each kind of change the flows of settled states between which the case changes.
 
     Without such flows from half the slowest, or up to twice the fastest. An engine beside the one
     on trial looks where that one found something."""
@@ -363,11 +357,9 @@ def _sinking_and_slipping(each: Findings) -> Iterator[tuple[Passage, Search]]:
 
 
 def _settle_beside(runner: Runner, found: Sequence[Findings]) -> None:
-    """Settle states beside every change; those count that did settle, in the case that belongs
-    there.
+    """Settle states beside every change; those count that settle in the case there.
 
-    A bracket is taken for a change only if something was seen beyond it, or that may be taken for
-    granted."""
+    A bracket counts only if something was seen beyond it, or that is granted."""
     beside: list[tuple[Findings, Beside, str, Array]] = []  # how they start, flows in rad s-1
     for each in found:
         unseen = [
@@ -410,11 +402,9 @@ def _settle_beside(runner: Runner, found: Sequence[Findings]) -> None:
 
 
 def _on_the_wall_and_back(each: Findings) -> Iterator[tuple[Passage, Search]]:
-    """Searches for where a ball on the wall begins to slip, and up to where one pressed to the
-    floor rolls again.
+    """Searches for where slip begins on the wall, and where a pressed ball rolls again.
 
-    They begin from settled states continued to each flow; the pressed one has a thousandth less
-    spin on the wall."""
+    They begin from settled states continued; the pressed one has a bit less spin."""
     width = each.runner.sampling.thresholds_width
     begins, carried = each.brackets.get(Passage.NS_ENDS), each.states.get(Beside.NR, [])
     if begins and len(carried) == len(DISTANCES_OF_NR):
@@ -444,8 +434,7 @@ def continued(states: Sequence[SteadyState], height: float, less: float = 0.0) -
 
 
 def _end_of_slipping(each: Findings) -> tuple[Estimate | None, bool]:
-    """The maximum of omega_0 along the branch of slipping, if it ends in a fold; and whether it
-    ends without one.
+    """The maximum of omega_0 along SS, if it ends in a fold; whether it ends without.
 
     There is no fold where the floor would have to pull at that maximum, or there is none and the
     floor's force vanishes just where the wall begins to carry the ball."""
@@ -486,8 +475,7 @@ def extrapolated(
 
 
 def _fold(each: Findings) -> Iterator[tuple[Passage, Search]]:
-    """A search for the largest flow at which a ball on the floor settles, about the maximum of
-    omega_0 on the branch.
+    """A search for the largest flow at which a ball on the floor settles, at the fold.
 
     At a fold all slows down, like the root of the distance."""
     top, _ = _end_of_slipping(each)

@@ -331,8 +331,7 @@ def rolls_on(run: Trajectory) -> bool:
 
 
 def mean_errors(runner: Runner, slipping: Sequence[tuple[Pulsation, float]]) -> Measured:
-    """Means over the last period in pulsations of these amplitudes, with both steps, once periods
-    repeat.
+    """Means over the last period in pulsations, with both steps, once periods repeat.
 
     The engine may remember what a state doesn't hold, such as how strongly floor and wall press
     against each other. How much the mean depends on it is seen in periods that start anew from
