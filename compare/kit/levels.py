@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 
@@ -211,7 +212,7 @@ def sets(level: Level) -> dict[str, Parameters]:
     named = {name: Parameters.named(name) for name in ("reference", "high-wall-friction")}
     chosen = {}
     for name, row in _CHOSEN.items():
-        values = dict(zip(_FIELDS, row, strict=False))
+        values: dict[str, Any] = dict(zip(_FIELDS, row, strict=False))
         chosen[name] = Parameters(**values, omega_0=1.0, drag=_DRAG.get(name, STOKES))
     sets = named | chosen
     if level > Level.QUICK:  # a scrambled Sobol sequence fills the box evenly
