@@ -71,10 +71,8 @@ def run(args: argparse.Namespace) -> int:
         )
     title, lines = f"What balls come to ({args.engine.name})", []
     for branch in itertools.chain.from_iterable(each["branches"] for each in data["sets"]):
-        name, values = (
-            branch["parameter"],
-            [orbit[branch["parameter"]] for orbit in branch["orbits"]],
-        )
+        name = branch["parameter"]
+        values = [orbit[branch["parameter"]] for orbit in branch["orbits"]]
         lines.append(
             f"Followed in {name}, {len(values)} orbits from {min(values):.6g} to {max(values):.6g}:"
         )
@@ -114,8 +112,7 @@ def attractor_data(of: Attractor) -> dict[str, Any]:
 
 
 def branch_data(branch: orbit_branch.OrbitBranch) -> dict[str, Any]:
-    """A branch of orbits as JSON-able data, SI; each bifurcation with the orbit there or nearest to
-    it."""
+    """A branch of orbits as JSON-able data, SI; each bifurcation with an orbit."""
 
     def orbit_data(orbit: Orbit) -> dict[str, Any]:
         return {
@@ -177,8 +174,7 @@ def _table(data: dict[str, Any]) -> pages.Rows:
 def _page(
     title: str, words: Sequence[str], p: Parameters, data: dict[str, Any], table: pages.Rows
 ) -> str:
-    """The table in Markdown, with the parameters, the command that writes it and the orbits of each
-    branch."""
+    """The table in Markdown, with parameters, command, and the orbits of each branch."""
     symbols = {f.name: f.metadata["symbol"] for f in p.quantities()}
     units = {f.name: pages.readable(f.metadata["unit"]) for f in p.quantities()}
     given = ", ".join(
@@ -238,9 +234,8 @@ def run_basins(args: argparse.Namespace) -> int:
     with running.campaign(args, "basins") as campaign:
         mapped = basins(campaign, p, start._asdict(), (across, up), args.mujoco, args.timestep)
     if args.map and args.map.suffix.lower() in drawing.SUFFIXES:
-        from compare.subjects.attractors import (
-            figures,
-        )  # here, because drawing takes a second to load
+        # here, because drawing takes a second to load
+        from compare.subjects.attractors import figures
 
         drawing.save(figures.draw_basins(mapped), args.map)
     elif args.map:

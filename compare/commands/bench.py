@@ -1,5 +1,4 @@
-"""Contacts and engines: ``forecast`` of any MuJoCo model, ``league``, also with own settings, the
-exact ``cases``."""
+"""Contacts and engines: ``forecast`` of any MuJoCo model, ``league``, the exact ``cases``."""
 
 from __future__ import annotations
 
@@ -49,11 +48,9 @@ def run_league(args: argparse.Namespace) -> int:
         )
     data = league.to_mapping(found)
     write_text(args.output / LEAGUE_JSON, json.dumps(data, indent=1))
-    summary, rows, columns = (
-        league.summary(found),
-        league.rows(found),
-        enumerate(league.ranked(found).values(), 1),
-    )
+    summary = league.summary(found)
+    rows = league.rows(found)
+    columns = enumerate(league.ranked(found).values(), 1)
     shown = {
         "summary": summary,
         "rows": rows,
@@ -93,9 +90,8 @@ def run_forecast(args: argparse.Namespace) -> int:
     count = 3 if args.tries else 2
     settling, trying = (settled.part(args.tell, k, count) for k in (0, 2))
     heard = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(
-        lambda _: None
-    )  # it would write a log here; what it warns of is in the table
+    # it would write a log here; what it warns of is in the table
+    mujoco.set_mju_user_warning(lambda _: None)
     try:
         model, data = settled.load(args.file, args.keyframe)
         settled.set_controls(model, data, args.ctrl)
@@ -135,9 +131,8 @@ def run_forecast(args: argparse.Namespace) -> int:
 
 def run_cases(args: argparse.Namespace) -> int:
     """List the exact cases, show one, or write all."""
-    if not (
-        args.name or args.json or args.output
-    ):  # as a file has them, since the cases are simulated
+    # as a file has them, since the cases are simulated
+    if not (args.name or args.json or args.output):
         known = json.loads(
             (resources.files("compare.bench") / "templates" / "cases.json").read_text("utf-8")
         )

@@ -62,12 +62,10 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-FLOW, RISING, FALLING, LEFT_OUT = (
-    "omega_0 (rad/s)",
-    "omega_c rising (rad/s)",
-    "omega_c falling (rad/s)",
-    "model error (%)",
-)
+FLOW = "omega_0 (rad/s)"
+RISING = "omega_c rising (rad/s)"
+FALLING = "omega_c falling (rad/s)"
+LEFT_OUT = "model error (%)"
 
 
 def curve(
@@ -76,8 +74,7 @@ def curve(
     """The curve at `count` flows between two, rad s-1, and beside each jump, by labels with units.
 
     Readings, K-factors and branches while the flow rises from rest and while it falls, and what
-    the model leaves out; volume flows and pulses if there is a swirl constant, rad m-3.
-    """
+    the model leaves out; volume flows and pulses if there is a swirl constant, rad m-3."""
     flows = flows_between(p, slowest, top, count)
     rising, falling = design.readings(p, flows)
     columns: dict[str, Any] = {"Q (m3/s)": flows / swirl} if swirl else {}
@@ -92,8 +89,7 @@ def curve(
 
 
 def flows_between(p: Parameters, slowest: float, top: float, count: int) -> Array:
-    """So many flows above 0 from the slowest to the fastest, and both sides of each jump, rad
-    s-1."""
+    """So many flows above 0 between two, and both sides of each jump, rad s-1."""
     t = bifurcation.thresholds(p)
     sides = np.outer([t.omega_01, t.omega_02, t.omega_03, t.omega_04], (1 - 1e-6, 1 + 1e-6)).ravel()
     flows = np.linspace(slowest, top, count + (slowest == 0))[slowest == 0 :]
@@ -112,8 +108,7 @@ def motions(p: Parameters, flows: Array, read: Array, rising: bool) -> list[str]
 def in_words(
     p: Parameters, slowest: float, top: float, swirl: float | None, off: float
 ) -> list[str]:
-    """What a meter's user asks first: range, K-factor, turndown, repeatability, and what to
-    doubt."""
+    """What a meter's user asks: range, K-factor, turndown, repeatability, doubts."""
     flows = flows_between(p, slowest, top, FINE)
     rising, falling = design.readings(p, flows)
     limit = analytic.operating_limit(p)

@@ -29,8 +29,7 @@ from model.versions import version
 def program() -> NoReturn:
     """This process as the program: ends with the exit code, and at once for a second signal.
 
-    What standard output can't show in its encoding is spelled.
-    """
+    What standard output can't show in its encoding is spelled."""
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="spelled")
     os.environ["MPLBACKEND"] = (
@@ -59,8 +58,7 @@ def program() -> NoReturn:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the program with the given arguments, the process's own for None; return its exit
-    code."""
+    """Run the program with arguments, the process's own for None; return its exit code."""
     args = argparse.Namespace(resumes=False)
     try:
         return _run(sys.argv[1:] if argv is None else argv, args)
@@ -111,10 +109,8 @@ def _run(argv: Sequence[str], args: argparse.Namespace) -> int:
     parsers.parser(words).parse_args(words, args)
     module, _, function = args.run.partition(".")
     run = getattr(importlib.import_module(f"compare.commands.{module}"), function)
-    args.words = [
-        "dualball",
-        *(word.strip() for word in words),
-    ]  # a page says with what it was written
+    # a page says with what it was written
+    args.words = ["dualball", *(word.strip() for word in words)]
     own = hasattr(args, "quiet") or getattr(args, "view", False) or args.run == "look.explore"
     quiet = own or getattr(args, "json", False)
     telling = nullcontext(lambda done: None) if quiet else waiting.told(words[0])

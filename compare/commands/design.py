@@ -52,8 +52,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def request(asked: Mapping[str, Any]) -> Request:
-    """The request for a meter that a TOML file makes; `InputError` names table, field, value, unit
-    and range."""
+    """The request for a meter that a TOML file makes; `InputError` names what is wrong."""
     check_names(asked, ["fluid", "flow", "bounds", "material", "tolerances"], "table")
     fluid = _table(asked, "fluid", _FLUID, ["nu_f", "rho_f"], texts=("drag", "C_D"))
     flow = _table(asked, "flow", _FLOW, ["slowest", "fastest"])
@@ -79,10 +78,8 @@ def request(asked: Mapping[str, Any]) -> Request:
     bounds: dict[str, dict[str, Interval]] = {}
     for each in materials:
         check_names(each, ["name", *_BOUNDS], "property of a material", ["name"])
-        own = {"j": _USUAL["j"]} | {
-            **common,
-            **each,
-        }  # a material's own bounds, and else those of all
+        # a material's own bounds, and else those of all
+        own = {"j": _USUAL["j"]} | {**common, **each}
         name = own.pop("name")
         if not isinstance(name, str) or name in bounds:
             raise InputError(f"material.name = {name!r} must be a text, and no other material's")
@@ -120,8 +117,7 @@ def _table(
     needed: Sequence[str] = (),
     texts: Sequence[str] = (),
 ) -> dict[str, Any]:
-    """A table of the file with its numbers checked; `texts` are entries that are checked
-    elsewhere."""
+    """A table of the file with its numbers checked; `texts` are checked elsewhere."""
     table = asked.get(name, {})
     if not isinstance(table, Mapping):
         raise InputError(f"{name} = {table!r} must be a table, [{name}]")

@@ -1,5 +1,4 @@
-"""Shows what is stored: ``figures``, ``inspect``, ``compare``, ``render``; and ``explore``, what
-theory says."""
+"""Shows what is stored: ``figures``, ``inspect``, ``compare``, ``render``; and ``explore``."""
 
 from __future__ import annotations
 

@@ -65,8 +65,7 @@ def curve(path: str) -> tuple[str, Array, Array]:
 
 
 def in_words(found: list[Fit], best: Fit | None, name: str, flow: Array, read: Array) -> list[str]:
-    """What a curve tells: its kink, the factor of its flows, parameters, and what theory is off
-    by."""
+    """What a curve tells: its kink, factor of flows, parameters, what theory is off by."""
     symbol, unit = ("Q", "m³/s") if name == "Q" else ("ω₀", "rad/s")
     per_flow, theory = "rad/m³ " * (name == "Q"), ", by theory 1" * (name == "omega_0")
     if not found:

@@ -1,5 +1,4 @@
-"""``dualball predict``: what theory says about one set of parameters; ``parameters``: what a set
-is."""
+"""``dualball predict``: what theory says of a set; ``parameters``: what a set is."""
 
 from __future__ import annotations
 
@@ -29,8 +28,7 @@ from model.trajectory import AXES
 
 
 def show_parameters(args: argparse.Namespace) -> int:
-    """Show every parameter, with its value in the set that was asked for, and the names of all
-    sets."""
+    """Show every parameter, with its value in the set asked for, and all sets' names."""
     p, rows = options.parameters(args), []
     for field in Parameters.quantities():
         meta, value = field.metadata, getattr(p, field.name)
@@ -116,8 +114,7 @@ def described(p: Parameters) -> dict[str, Any]:
 
 
 def labelled(data: dict[str, Any]) -> dict[str, Sequence[Any]]:
-    """The solutions of `described` as a table has them, a row each; thresholds are the same in
-    all."""
+    """The solutions of `described` as a table, a row each; all have its thresholds."""
     solutions, thresholds = data["solutions"], data["thresholds"]
     rows: dict[str, Sequence[Any]] = {"case": [s["case"] for s in solutions]}
     rows["omega_0 (rad/s)"] = [data["parameters"].omega_0] * len(solutions)
@@ -155,8 +152,7 @@ def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
     """What `described` says of p: the reading, thresholds, solutions and what to mind, for the
     terminal.
 
-    Where the model is off for a real fluid that comes first, and the numbers have three digits.
-    """
+    Where the model is off for a real fluid that comes first, and the numbers have three digits."""
     off = data["model_error"]
 
     def to_digits(value: float, most: int) -> str:
@@ -241,8 +237,7 @@ def _set(p: Parameters) -> list[Table | Text]:
 
 
 def _complex(value: complex, largest: float, shown: Callable[[float, int], str]) -> str:
-    """A complex number and its conjugate; a real part that is round-off of the largest value is
-    0."""
+    """A complex number and its conjugate; a real part that is round-off is 0."""
     real = value.real if abs(value.real) > 1e-12 * largest else 0.0
     return shown(real, 4) + (f" ± {shown(abs(value.imag), 4)}i" if value.imag else "")
 

@@ -41,8 +41,7 @@ def flow(args: argparse.Namespace) -> Flow | None:
 
 
 def settings(args: argparse.Namespace, p: Parameters) -> AnySettings:
-    """Settings of the engine that the options of `add_engine` choose, for a ball; `InputError` for
-    one of others."""
+    """Settings of the chosen engine for a ball; `InputError` for an option of others."""
     chosen: engines.Engine = args.engine
     given = given_options(args, ("timestep", "rtol", "restitution"))
     for name in given:
@@ -53,8 +52,7 @@ def settings(args: argparse.Namespace, p: Parameters) -> AnySettings:
 
 
 def task(args: argparse.Namespace, p: Parameters, **more: Any) -> Task:
-    """The run of a ball that the options of `add_engine`, `add_start`, `add_samples` and ``--time``
-    describe."""
+    """The run of a ball that the options describe."""
     args.engine.check_set(p)
     chosen = settings(args, p)
     step = getattr(chosen, "timestep", None) or 0.0
@@ -75,8 +73,7 @@ def workers(args: argparse.Namespace) -> Workers:
 
 @contextmanager
 def campaign(args: argparse.Namespace, doing: str, **more: Any) -> Iterator[Campaign]:
-    """A campaign in a directory of ``--output`` by the workers that are named, whose progress is
-    shown."""
+    """A campaign in a directory of ``--output``, whose progress is shown."""
     with (
         progress.reporter(args.quiet or args.json, counted=True) as show,
         Campaign(

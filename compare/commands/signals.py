@@ -1,5 +1,4 @@
-"""Ctrl-C, and SIGTERM as clusters send it: both end a command with one line, and what is done is
-kept."""
+"""Ctrl-C, and SIGTERM as of clusters: both end a command with one line; what is done is kept."""
 
 from __future__ import annotations
 
@@ -18,8 +17,7 @@ _BOTH = (signal.SIGINT, signal.SIGTERM)
 _PATIENCE = 2.0
 """Of what is to stop by itself, s."""
 _WAITS = 200
-"""How often a signal waits for an import, .01 s at a time: a user's own engine may be one that
-never ends."""
+"""How often a signal waits for an import, .01 s at a time: one may never end."""
 
 
 class Interrupted(KeyboardInterrupt):
@@ -65,8 +63,7 @@ def on_first_signal(
 
 @contextmanager
 def noted() -> Iterator[list[int]]:
-    """A context in which the first signal is only appended to the yielded list; it is sent again
-    after some seconds."""
+    """A context in which the first signal is noted in a list; it is sent again later."""
     heard, sent = list[int](), list[threading.Timer]()
 
     def note(number: int, frame: FrameType | None) -> None:

@@ -1,5 +1,4 @@
-"""``dualball simulate``, ``sweep``, ``collect``: a run, many over ranges of parameters, and one
-file of all of them."""
+"""``dualball simulate``, ``sweep``, ``collect``: a run, many, and one file of all of them."""
 
 from __future__ import annotations
 
@@ -85,9 +84,8 @@ def run_sweep(args: argparse.Namespace) -> int:
             | {"engine": args.engine.name}
             | dataclasses.asdict(p)
         )
-        if (
-            path := args.output / "sweep.json"
-        ).exists():  # `collect` would mix another one with this
+        # `collect` would mix another one with this
+        if (path := args.output / "sweep.json").exists():
             with reading_json(path, "sweep") as held:
                 held = asked | held  # one of an earlier version lacks some
                 differ = [

@@ -159,8 +159,7 @@ def detail(verdict: Verdict) -> Text:
 
 
 def summary(verdicts: Sequence[Verdict], report: Path) -> Text:
-    """What all of it means, in three sentences: by the engine on trial, by those beside it, and
-    where to look."""
+    """What it means, in three sentences: the engine on trial, those beside, where to look."""
     ran = [verdict for verdict in verdicts if verdict.outcome is not Outcome.NOT_RUN]
     counts = ", ".join(map(" ".join, wording.totals(ran)))
     shown = Text(f"{wording.headline(ran)}: {counts}.", "bold")
@@ -172,8 +171,7 @@ def summary(verdicts: Sequence[Verdict], report: Path) -> Text:
     ]
     if beside:
         shown.append(
-            f"\nBeside it {', '.join(beside)}: none of that counts in the exit code.",
-            "not bold",
+            f"\nBeside it {', '.join(beside)}: none of that counts in the exit code.", "not bold"
         )
     coarse = wording.coarse_and_missing(ran)
     shown.append(

@@ -1,5 +1,4 @@
-"""Nothing runs for long without a word: a line on standard error for a command that shows no
-progress of its own."""
+"""Nothing runs for long without a word: a line for commands without progress of their own."""
 
 from __future__ import annotations
 
@@ -51,8 +50,7 @@ def told(what: str) -> Iterator[Callable[[float], None]]:
 
 
 class _Compiling:
-    """Whether numba compiles something now; it is heard of once it is loaded, and not loaded for
-    that."""
+    """Whether numba compiles something now; it isn't loaded for that."""
 
     def __init__(self) -> None:
         self._events: Any = None

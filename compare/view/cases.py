@@ -1,5 +1,4 @@
-"""The nine kinematic cases by picture and in words: seen along the orbit, floor below, wall
-right."""
+"""The nine kinematic cases by picture and in words, along the orbit: floor below, wall right."""
 
 from __future__ import annotations
 
@@ -16,8 +15,7 @@ def in_words(case: Case) -> str:
 
 
 def picture(case: Case) -> str:
-    """A case as SVG: a dot where the ball rolls, an arrow where it slips, a gap where it doesn't
-    touch."""
+    """A case as SVG: a dot where the ball rolls, an arrow where it slips, else a gap."""
     x = _WALL - _RADIUS - _GAP * (case.B is Contact.N)
     y = _FLOOR - _RADIUS - _GAP * (case.A is Contact.N)
     marks = ""

@@ -1,7 +1,6 @@
 """Who may speak to the page that this machine serves: its own tabs, and nobody for ever.
 
-A browser lets any site that a user visits send requests here, and says in ``Origin`` which one.
-"""
+A browser lets any site that a user visits send requests here, and says in ``Origin`` which one."""
 
 from __future__ import annotations
 

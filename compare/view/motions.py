@@ -1,8 +1,7 @@
 """Motions in words, tables and pictures: what a file of one holds, it on its cases, two side by
 side.
 
-Each is first described as data, then shown.
-"""
+Each is first described as data, then shown."""
 
 from __future__ import annotations
 
@@ -38,8 +37,7 @@ SEEN = 1e-5
 def describe(path: Path) -> dict[str, Any]:
     """Parameters, versions, cases over time, events and last state of a stored run, JSON-able.
 
-    Raises `StorageError` for a file that isn't a trajectory or isn't whole.
-    """
+    Raises `StorageError` for a file that isn't a trajectory or isn't whole."""
     samples, kept = 0, deque[Trajectory]()
     stretches: list[tuple[Case, float, float]] = []
     for last in storage.parts(path, PART):
@@ -135,8 +133,7 @@ def labelled(run: Trajectory) -> dict[str, Sequence[Any]]:
 def compared(a: Series, b: Series) -> dict[str, Any]:
     """Differences of all quantities that both have, cases, and parameters that differ, JSON-able.
 
-    Raises `InputError` as `difference`, and where they have no quantity in common.
-    """
+    Raises `InputError` as `difference`, and where they have no quantity in common."""
     both = [name for name in UNITS if name in a.values and name in b.values and name != "case"]
     if not both:
         raise InputError(
@@ -198,8 +195,7 @@ def compared_tables(about: dict[str, Any]) -> list[Any]:
 
 
 def draw_both(a: Series, b: Series) -> Figure:
-    """A figure of two motions in the quantities that both have, on the cases of the first, and of
-    their differences."""
+    """A figure of two motions in common quantities, on the first one's cases."""
     from compare.kit import style  # here, because drawing takes a second to load
 
     names = [name for name in a.values if name in b.values]
@@ -230,8 +226,7 @@ def draw_both(a: Series, b: Series) -> Figure:
 
 
 def draw(run: Trajectory) -> Figure:
-    """A figure of omega_c, slip, gaps and forces over time, on backgrounds in the colour of the
-    case."""
+    """A figure of omega_c, slip, gaps and forces over time, on the colours of cases."""
     from compare.kit import style  # here, because drawing takes a second to load
 
     t, p = run.time, run.header.parameters
@@ -239,10 +234,8 @@ def draw(run: Trajectory) -> Figure:
     scale, unit = (
         (1e3, "mm") if max(np.abs(run.y).max(), np.abs(run.h).max()) > 1e-5 else (1e6, "µm")
     )
-    friction_A, friction_B = (
-        np.hypot(*run.force_A[:, [0, 2]].T),
-        np.hypot(*run.force_B[:, [1, 2]].T),
-    )
+    friction_A = np.hypot(*run.force_A[:, [0, 2]].T)
+    friction_B = np.hypot(*run.force_B[:, [1, 2]].T)
     slips = zip("xyz", (red, green, pink), ("-", "--", ":"), strict=True)
     curves = {
         "angular velocity (rad/s)": (
