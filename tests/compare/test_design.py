@@ -58,7 +58,7 @@ def test_the_best_meter_as_json_and_as_a_page(tmp_path, capsys):
     # has all.
     for shown in (f"{worst['omega_0']:.3g}", f"{values['eta']:.4g}", "cork can't be used"):
         assert shown in text
-    assert text.count('<figure class="plot"') == 3
+    assert text.count('<figure class="plot"') == 2
 
 
 def test_a_search_tells_how_far_it_is(tmp_path):

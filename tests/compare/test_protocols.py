@@ -280,7 +280,7 @@ def test_a_state_that_depends_on_the_step_is_missing(runner, monkeypatch):
     assert {m.quantity for m in found.measurements} == {"case"}
     assert len(found.missing) == 3
     assert all(
-        "is SN with half the time step" in each.reason and each.rows > 10 for each in found.missing
+        "is SN with half the step" in each.reason and each.rows > 10 for each in found.missing
     )
 
 
