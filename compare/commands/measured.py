@@ -82,11 +82,11 @@ def in_words(found: list[Fit], best: Fit | None, name: str, flow: Array, read: A
     others = " and ".join(_symbol(each) for each in found[-1].free if each not in fit.free)
     alone = ", ".join(map(_symbol, fit.free)) + (f", if {others} are as given" * bool(others))
     off = [f"{_percent(fit.off[side])} % in {side.sum()} readings" for side in (rolls, ~rolls)]
-    factor = f"{_with(fit.factor, fit.u['factor'])} {per_flow}times {symbol}"
+    turns = f"{_with(fit.factor, fit.u['factor'])} {per_flow}times {symbol}"
     return [
         f"Kink: from {symbol} = {_with(fit.kink, fit.u['kink'])} {unit} on it slips, ω₀₁ (84): one "
         "combination of μ and η.",
-        f"Flow: the fluid turns with {factor}{theory}.",
+        f"Flow: the fluid turns with {turns}{theory}.",
         f"Told: {alone if best else 'no parameter by itself'}.",
         f"Theory is off by {off[0]} before the kink, where any theory fits, and by {off[1]} "
         "beyond.",
