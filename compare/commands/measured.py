@@ -69,12 +69,12 @@ def in_words(found: list[Fit], best: Fit | None, name: str, flow: Array, read: A
     symbol, unit = ("Q", "m³/s") if name == "Q" else ("ω₀", "rad/s")
     per_flow, theory = "rad/m³ " * (name == "Q"), ", by theory 1" * (name == "omega_0")
     if not found:
-        factor = float(np.mean(read / flow))
+        times = float(np.mean(read / flow))
         return [
             f"No kink: {len(flow)} readings up to {symbol} = {rounded(float(flow.max()))} {unit} "
             "are in proportion to the flow.",
-            f"ω_c is {rounded(factor)} {per_flow}times {symbol}{theory}, within "
-            f"{_percent(read / flow / factor - 1)} %.",
+            f"ω_c is {rounded(times)} {per_flow}times {symbol}{theory}, within "
+            f"{_percent(read / flow / times - 1)} %.",
             "The ball rolls, and tells nothing of friction and drag.",
         ]
     fit = best or found[0]
