@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
@@ -71,7 +72,8 @@ def load(path: Path, keyframe: str | None = None) -> tuple[Any, Any]:
         # MuJoCo takes the bytes of a name as UTF-8, also where Python's file system has another
         # encoding.
         name = os.fsencode(path).decode("utf-8", "surrogateescape")
-        _check_sizes(mujoco.MjSpec.from_file(name))
+        _check_sizes(_heightfields(path))
+        _check_sizes(_sizes(mujoco.MjSpec.from_file(name)))
         model = mujoco.MjModel.from_xml_path(name)
         check_number("timestep", model.opt.timestep, "s", POSITIVE)
     except InputError as error:
@@ -92,10 +94,32 @@ def load(path: Path, keyframe: str | None = None) -> tuple[Any, Any]:
     return model, data
 
 
-def _check_sizes(spec: Any) -> None:
-    """`InputError` for what a line of MJCF can ask for and no memory holds."""
+Sizes = dict[str, tuple[int, int]]
+"""Rows and columns of what a model is made of."""
+
+
+def _heightfields(path: Path) -> Sizes:
+    """Those of the file itself: MuJoCo makes room for them while it reads."""
+    try:
+        found = ElementTree.parse(path).iter("hfield")
+    except (ElementTree.ParseError, LookupError, ValueError):
+        return {}  # MuJoCo says what is wrong
+    sizes = {each.get("name"): (each.get("nrow", ""), each.get("ncol", "")) for each in found}
+    return {
+        f"heightfield {name!r}": (int(rows), int(columns))
+        for name, (rows, columns) in sizes.items()
+        if rows.isdecimal() and columns.isdecimal()
+    }
+
+
+def _sizes(spec: Any) -> Sizes:
+    """Those of what MuJoCo has read."""
     sizes = {f"heightfield {each.name!r}": (each.nrow, each.ncol) for each in spec.hfields}
-    sizes |= {f"texture {each.name!r}": (each.width, each.height) for each in spec.textures}
+    return sizes | {f"texture {each.name!r}": (each.width, each.height) for each in spec.textures}
+
+
+def _check_sizes(sizes: Sizes) -> None:
+    """`InputError` for what a line of MJCF can ask for and no memory holds."""
     for what, (rows, columns) in sizes.items():
         if rows * columns > MOST_POINTS:
             raise InputError(

@@ -390,6 +390,12 @@ def test_what_has_no_forecast_gets_one_line(text, forecasts, tmp_path):
     assert [each.name for each in tmp_path.iterdir()] == ["scene.xml"]
 
 
+def test_a_huge_heightfield_is_refused_before_it_is_made(forecasts, monkeypatch):
+    monkeypatch.delattr(mujoco, "MjSpec")  # which would make room for it
+    (text,) = (each for each in REFUSED if "hfield" in each)
+    assert "heightfield 'h'" in forecasts(text, code=2)
+
+
 def test_the_page_the_json_and_what_the_engine_replaces(forecasts, tmp_path):
     text = SCENES["hidden mix"].replace("<option ", '<option timestep=".008" ')
     shown = forecasts(text, "--try", "--json", "-o", str(page := tmp_path / "page.html"))
