@@ -165,9 +165,8 @@ def run_cases(args: argparse.Namespace) -> int:
             if chosen.joint
             else "",
             "force": f"m g = {chosen.body.mass * chosen.g:.6g} N down, pull "
-            f"{_numbers(chosen.pull)} N, growth "
-            f"{_numbers(chosen.growth)} N/s, drag {chosen.drag:g} 1/s, flow {chosen.flow:g} rad/s, "
-            f"spring {chosen.spring:g} N/m",
+            f"{_numbers(chosen.pull)} N, growth {_numbers(chosen.growth)} N/s, drag "
+            f"{chosen.drag:g} 1/s, flow {chosen.flow:g} rad/s, spring {chosen.spring:g} N/m",
             "scales": f"{_numbers(chosen.scales)} of position (m), velocity (m/s), spin (rad/s); "
             f"inf: not compared",
             "source": f"{chosen.source}; error below {chosen.bound:g}",

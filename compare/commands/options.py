@@ -363,8 +363,7 @@ def add_engine_name(parser: argparse._ActionsContainer, default: str | None, usu
     known = (
         "mujoco is under Coulomb's law, mujoco-plain isn't, mujoco-defaults is MuJoCo as it comes; "
         "others: mujoco-free, event, time-stepping, siconos, and NAME or NAME-defaults of "
-        f"{FOREIGN} "
-        f"({usual})"
+        f"{FOREIGN} ({usual})"
     )
     parser.add_argument("--engine", type=engine, default=default, metavar="NAME", help=known)
 

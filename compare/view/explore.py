@@ -60,11 +60,9 @@ SLIDERS: dict[str, tuple[str, float, float, float]] = {
 """Text, range and step of each."""
 SYMBOLS = {"omega_01": "ω₀₁", "omega_02": "ω₀₂", "omega_03": "ω₀₃", "omega_04": "ω₀₄"}
 LIMITS = (
-    "The model is the paper's: a rigid ball with Coulomb's friction in a fluid that turns like "
-    "a rigid "
-    "body. Left out are rolling resistance, the fluid's inertia and its torque on the spinning "
-    "ball. "
-    "In water or oil that torque changes the numbers by tens of per cent."
+    "The model is the paper's: a rigid ball with Coulomb's friction in a fluid that turns like a "
+    "rigid body. Left out are rolling resistance, the fluid's inertia and its torque on the "
+    "spinning ball. In water or oil that torque changes the numbers by tens of per cent."
 )
 """What a user of the page may not take from it."""
 Figure = dict[str, Any]
@@ -353,8 +351,7 @@ def _heading(ui: Any) -> None:
     about = (
         "It touches the floor and the wall. A case has a letter for each: R rolls, S slips, N does "
         "not touch. Left: move a slider. Middle: which steady motions theory has. Right: the "
-        "motion, "
-        "simulated anew. The address holds what you set: to share it, copy the link."
+        "motion, simulated anew. The address holds what you set: to share it, copy the link."
     )
     ui.html(f"<p>{about}</p><p>{LIMITS}</p>", sanitize=False).classes("text-sm about")
     ui.add_css(".title h1 { font-size: 1.5rem; line-height: 1.3; margin: 0 }")

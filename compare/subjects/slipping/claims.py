@@ -299,8 +299,7 @@ CLAIMS = (
         ),
         expected=Outcome.REFUTED,
         reason="False for the Euclidean normal (75): γ is larger along other directions. With "
-        "kinetic energy as the "
-        "inner product it is true.",
+        "kinetic energy as the inner product it is true.",
     ),
     *(
         claim(
@@ -310,8 +309,7 @@ CLAIMS = (
             "floor carries its weight."
             if inner is Case.RS
             else f"Out of {inner.name} the ball lifts off the floor once the wall alone, in "
-            f"{outer.name}, would "
-            "accelerate it upwards.",
+            f"{outer.name}, would accelerate it upwards.",
             *(
                 Criterion(
                     "lift",

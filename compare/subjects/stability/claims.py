@@ -151,9 +151,8 @@ CLAIMS = (
         ),
         text=Text.CORRECTED,
         reason="With A_y = 0 the state is on the border to NR: the eigenvalues show on the side "
-        "where the ball leans "
-        "on the floor; on the other it lifts off, and its height is then free. (35) needs ω₀ ≥ "
-        "√(g/(ηR)), not ≤.",
+        "where the ball leans on the floor; on the other it lifts off, and its height is then "
+        "free. (35) needs ω₀ ≥ √(g/(ηR)), not ≤.",
     ),
     claim(
         "prop-4-rate",

@@ -187,8 +187,7 @@ _SHOWN = {
     "fig-9": "off the floor, where y is free: sinking along the wall (NS) passes over to riding it "
     "(NR) at P2",
     "fig-10": "on the floor, for η < j: rolling (RR) passes over to slipping (SS) at P3, SS turns "
-    "back at the fold "
-    "F and ends in SR at NF2",
+    "back at the fold F and ends in SR at NF2",
     "fig-11": "on the floor, for η > j: SR appears at ω₀₂, and RR ends at ω₀₃ where it meets SR "
     "(dots)",
     "fig-12": "as Fig. 11, but with the floor allowed to pull (A_y < 0), which is formal: the "
