@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -128,36 +128,55 @@ def _case_on_wall(m: Measurement) -> float:
     return float(Case.NR if stable else Case.NS)
 
 
+def _growth(arrow: tuple[Case, Case]) -> Iterator[Criterion]:
+    """Criteria on slips along an arrow, at random or dragged, and on what follows them."""
+    when = _along(arrow, "", "dragged")
+    yield Criterion("growth", "gamma", _gamma, when=when, by="slip_stability.gamma")
+    if arrow == _NR_NS:
+        yield Criterion("growth", "gamma", _gamma_nr, when=when, by="slip_bounds.gamma_nr")
+    for protocol, ways in (
+        ("growth", ("", "dragged", "sideways")),  # at rest RS and RN look the same
+        ("bounds", ("held", "stationary")),
+    ):
+        when = _along(arrow, *ways)
+        yield Criterion(protocol, "case", _following_case, when=when, by="analytic.simulate")
+
+
+def _lifts(m: Measurement) -> float:
+    """Whether the wall alone would accelerate the ball upwards."""
+    return slip_stability.lift_acceleration(*_arrow(m), _state(m), m.parameters) > 0
+
+
+def _lift_onset(m: Measurement) -> float:
+    """Where that begins."""
+    return slip_stability.lift_onset(*_arrow(m), _state(m), m.parameters)
+
+
+def _moving_force(m: Measurement) -> float:
+    """What the floor carries of a ball that moves, N."""
+    return float(analytic.contact_forces(_arrow(m)[0], _state(m), m.parameters)[0][1])
+
+
+def _lift(inner: Case) -> Iterator[Criterion]:
+    """Criteria on whether and where the ball lifts out of a case, and on the floor's force."""
+    when = given(inner=inner.name)
+    yield Criterion("lift", "lifts", _lifts, when=when, by="slip_stability: lift")
+    if inner is not Case.RS:
+        yield Criterion("lift", "lift_onset", _lift_onset, when=when, by="slip_stability: lift")
+    if inner is not Case.RR:
+        by = "analytic.contact_forces"
+        yield Criterion("lift", "moving_force_Ay", _moving_force, when=when, by=by)
+
+
 CLAIMS = (
     *(
-        # Slips at random or dragged; not in the direction that bears on the extrema alone.
         claim(
             f"slip-{arrow[0].name}-{arrow[1].name}",
             "(56)-(59)" if arrow == _NR_NS else "(53), Fig. 6",
             f"Out of {arrow[0].name} a slight slip in any direction that {arrow[1].name} allows "
             "grows at the rate γ while forces admit it; else the ball passes into another case, as "
             "the equations of motion say.",
-            *(
-                Criterion("growth", "gamma", gamma, when=_along(arrow, "", "dragged"), by=by)
-                for gamma, by in (
-                    (_gamma, "slip_stability.gamma"),
-                    (_gamma_nr, "slip_bounds.gamma_nr"),
-                )
-                if gamma is _gamma or arrow == _NR_NS
-            ),
-            *(
-                Criterion(
-                    protocol,
-                    "case",
-                    _following_case,
-                    when=_along(arrow, *by),
-                    by="analytic.simulate",
-                )
-                for protocol, by in (
-                    ("growth", ("", "dragged", "sideways")),  # at rest RS and RN look the same
-                    ("bounds", ("held", "stationary")),
-                )
-            ),
+            *_growth(arrow),
         )
         for arrow in slip_stability.SLIP_ARROWS
     ),
@@ -310,41 +329,7 @@ CLAIMS = (
             if inner is Case.RS
             else f"Out of {inner.name} the ball lifts off the floor once the wall alone, in "
             f"{outer.name}, would accelerate it upwards.",
-            *(
-                Criterion(
-                    "lift",
-                    quantity,
-                    predict,
-                    when=given(inner=inner.name),
-                    by="slip_stability: lift",
-                )
-                for quantity, predict in (
-                    (
-                        "lifts",
-                        lambda m: (
-                            slip_stability.lift_acceleration(*_arrow(m), _state(m), m.parameters)
-                            > 0
-                        ),
-                    ),
-                    (
-                        "lift_onset",
-                        lambda m: slip_stability.lift_onset(*_arrow(m), _state(m), m.parameters),
-                    ),
-                )
-                if quantity == "lifts" or inner is not Case.RS
-            ),
-            *(
-                Criterion(
-                    "lift",
-                    "moving_force_Ay",
-                    lambda m: float(
-                        analytic.contact_forces(_arrow(m)[0], _state(m), m.parameters)[0][1]
-                    ),
-                    when=given(inner=inner.name),
-                    by="analytic.contact_forces",
-                )
-                for _ in range(inner is not Case.RR)
-            ),
+            *_lift(inner),
         )
         for inner, outer in slip_stability.LIFT_ARROWS
     ),
