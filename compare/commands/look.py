@@ -19,9 +19,10 @@ def figures(args: argparse.Namespace) -> int:
     from compare import gallery as registry
     from compare import validation  # here, because drawing takes a second to load
     from compare.kit.doubt import model_warning
+    from compare.report import results
 
-    if args.results and not args.results.is_dir():
-        raise InputError(f"cannot read {args.results}: there is no such directory")
+    if args.results:
+        results.load(args.results)  # else there would be figures without what was measured
     if own := list(options.own_set(args).values()):
         chosen = registry.of_set(*own)
         for doubt in model_warning(max(map(real_fluid.model_error, own))):
@@ -31,7 +32,7 @@ def figures(args: argparse.Namespace) -> int:
     if args.figure:
         check_names(args.figure, list(chosen), "figure")
         chosen = {name: chosen[name] for name in args.figure}
-    formats = args.format or ["svg"]
+    formats = list(dict.fromkeys(args.format or ["svg"]))
     for k, (name, gap) in enumerate(registry.write(args.output, chosen, formats), 1):
         args.tell(k / len(chosen))
         files = [name] if gap else [f"{name}.{suffix}" for suffix in formats]

@@ -249,6 +249,10 @@ def test_what_has_nothing_to_draw_is_said(draw, said):
 
 def test_one_figure_is_drawn_where_one_is_named(tmp_path, capsys):
     told(capsys, f"figures --set reference --figure fig-9 --format png -o {tmp_path / 'one'}")
+    twice = f"figures --set reference --figure fig-9 {2 * '--format svg '}-o {tmp_path / 'two'}"
+    assert told(capsys, twice).count("written") == 1
+    said = refused(capsys, f"figures --results {tmp_path} -o {tmp_path / 'none'}")
+    assert "summary.json: No such file" in said
     assert {each.name for each in (tmp_path / "one").iterdir()} == {"fig-9.png", "captions.txt"}
     named = "figures --set reference --figure fig-99"
     assert "fig-99" in refused(capsys, named)
