@@ -27,6 +27,8 @@ from compare.kit.pages import typeset
 
 HERE = Path(__file__).parent
 PACKAGES = ("model", "analytic", "mjsim", "compare")
+INNER = ("commands", "report", "view")
+"""Rooms of `compare` that are the program itself, which nobody calls: its help tells of them."""
 log = logging.getLogger(__name__)
 
 project = "dualball"
@@ -147,7 +149,11 @@ def page(package: ModuleType) -> None:
     rooms = [
         importlib.import_module(f"{package.__name__}.{each.name}") for each in modules if each.ispkg
     ]
-    rooms = [room for room in rooms if any(pkgutil.iter_modules(room.__path__))]
+    rooms = [
+        room
+        for room in rooms
+        if any(pkgutil.iter_modules(room.__path__)) and room.__name__.split(".")[1] not in INNER
+    ]
     if rooms:
         lines += ["", ".. toctree::", "   :hidden:", "", *(f"   {room.__name__}" for room in rooms)]
     (HERE / "api" / f"{package.__name__}.rst").write_text("\n".join(lines) + "\n", "utf-8")
