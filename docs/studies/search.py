@@ -7,11 +7,11 @@ is looked at until its hopping closes, goes on, or ends."""
 
 from __future__ import annotations
 
+import argparse
 import dataclasses
 import json
 import math
 import os
-import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -224,7 +224,7 @@ def draw(sets: int, rows: Sequence[Row]) -> Figure:
         ground = 100 * (hopping / np.maximum(of_all, 1)).T
         shown = axes.pcolormesh(*edges, ground, cmap="Blues", vmin=0, zorder=0)
         figure.colorbar(shown, ax=axes, label="sets that hop, %")
-        axes.plot(x, y, ".", ms=3, color="#D55E00")
+        axes.plot(x, y, ".", ms=1.5, color="#D55E00")
         across, up = ("log" if name in LOGARITHMIC else "linear" for name in (a, b))
         axes.set(xlabel=symbols[a], ylabel=symbols[b], xscale=across, yscale=up)
     return figure
@@ -248,4 +248,6 @@ def main(sets: int) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]))
+    parser = argparse.ArgumentParser(description="Where in parameter space the ball hops for ever.")
+    parser.add_argument("sets", type=int, help="how many are searched")
+    main(parser.parse_args().sets)

@@ -208,7 +208,7 @@ def test_what_is_not_installed_says_what_to_do(name, named, says, tmp_path, monk
     with pytest.raises(InputError, match=says):
         validate(tmp_path / "results", engine=ENGINES[name])
     monkeypatch.chdir(tmp_path)
-    for command in ("simulate", "sweep --vary eta=0.1,0.2", "attractors", "validate"):
+    for command in ("simulate", "sweep --vary eta=0.1,0.2", "attractors", "validate", "league"):
         assert says in refused(capsys, f"{command} --engine {name}")
     assert not [*tmp_path.iterdir()]
 

@@ -17,7 +17,6 @@ from compare.bench import cases, run
 from compare.bench.case import TIME_STEPS, VERSION, read
 from compare.bench.runner import run_all
 from model import InputError, StorageError
-from model.versions import ABSENT, version
 from tests.commands import refused, told
 from tests.exact_cases import CASES
 
@@ -122,22 +121,6 @@ def test_engines_that_are_none(engine, says):
     with pytest.raises(InputError) as refused:
         run(CASES["box-stops"], engine)
     assert says in str(refused.value)
-
-
-def test_what_is_not_installed_says_what_to_do(tmp_path, monkeypatch, capsys):
-    monkeypatch.setenv("DUALBALL_SICONOS_PYTHON", "absent")
-    absent = [
-        ("siconos", "siconos is not installed for absent, which DUALBALL_SICONOS_PYTHON names")
-    ]
-    absent += [
-        (name, f"{package} is not installed: pip install {package}")
-        for name, package in (("newton-xpbd", "newton"), ("mujoco-warp", "mujoco-warp"))
-        if version(package) == ABSENT
-    ]
-    for name, says in absent:
-        said = refused(capsys, f"league --engine mujoco --engine {name} -o {tmp_path / 'lost'}")
-        assert said == f"dualball: error: {says}\n"
-    assert not [*tmp_path.iterdir()]
 
 
 @pytest.mark.parametrize("state", ["[numpy.full(3, numpy.nan)] * 3", "1 / 0"])
