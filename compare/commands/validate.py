@@ -33,9 +33,8 @@ def run(args: argparse.Namespace) -> int:
     console, chosen = options.terminal(quiet=args.json), options.own_set(args) or None
     if args.list:
         rows = [[claim.id, claim.source, claim.statement, str(claim.text)] for claim in CLAIMS]
-        options.terminal().print(
-            pages.table("", [["claim", "source", "statement", "text"], *rows], justify="left")
-        )
+        head_row = ["claim", "source", "statement", "text"]
+        options.show(None, False, pages.table("", [head_row, *rows], justify="left"))
         return 0
     titles = iter([head()])
 

@@ -240,7 +240,9 @@ def test_help_names_every_command_engine_and_option_and_gives_examples_that_are_
 
 def test_claims_and_parameters_are_listed_once(monkeypatch, capsys):
     monkeypatch.delenv("COLUMNS", raising=False)  # names wrap in narrow terminals
-    assert {claim.id for claim in CLAIMS} <= set(told(capsys, "validate --list").split())
+    listed = told(capsys, "validate --list")
+    assert {claim.id for claim in CLAIMS} <= set(listed.split())
+    assert not [line for line in listed.splitlines() if line.endswith(" ")]
     shown, of_sweep = told(capsys, "parameters --mu 0.31"), parser_of("sweep").format_help()
     assert "0.31" in shown
     for field in Parameters.quantities():
