@@ -31,12 +31,6 @@ def test_only_what_takes_long_says_so(soon, capsys):
     assert "s: slow, 25%" in said[1]
 
 
-def test_before_anything_is_said_there_is_no_line(soon, capsys):
-    with progress.reporter():
-        time.sleep(0.5)
-    assert capsys.readouterr().err == ""
-
-
 def test_compiling_says_so_and_is_no_measure_of_what_is_left(soon, capsys):
     @numba.njit
     def slow(x):
