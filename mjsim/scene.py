@@ -58,29 +58,28 @@ def _set_contacts(spec: Any, settings: ContactSettings) -> None:
         pair.solimp = (settings.solimp, settings.solimp, 1e-4, 0.5, 2.0)
 
 
-def build(p: Parameters, settings: ContactModel, shown: bool = False) -> tuple[Any, str]:
+def build(p: Parameters, settings: ContactModel) -> tuple[Any, str]:
     """The scene compiled to an `mujoco.MjModel` of its own, and as the MJCF text that is simulated.
 
-    Both have textures only if the scene is to be `shown`: they are 1.7 MB, take most of the time to
-    build it, and no step looks at them.
+    Textures are left out: they are 1.7 MB, take most of the time to build it, and no step looks at
+    them.
 
     Raises `InputError` if MuJoCo refuses the parameters.
     """
     # the fluid is no part of a scene
-    model, text = _compiled(p.replace(omega_0=0.0), settings, shown)
+    model, text = _compiled(p.replace(omega_0=0.0), settings)
     return copy.copy(model), text
 
 
 @functools.lru_cache(maxsize=256)
-def _compiled(p: Parameters, settings: ContactModel, shown: bool) -> tuple[Any, str]:
+def _compiled(p: Parameters, settings: ContactModel) -> tuple[Any, str]:
     """`build` from a cache; the model is shared."""
     filled = spec(p, settings)
     try:
-        if not shown:
-            for texture in list(filled.textures):
-                filled.delete(texture)
-            for material in filled.materials:
-                material.textures = [""] * len(material.textures)
+        for texture in list(filled.textures):
+            filled.delete(texture)
+        for material in filled.materials:
+            material.textures = [""] * len(material.textures)
         text = str(filled.to_xml())
         model = filled.compile()
     except ValueError as error:
