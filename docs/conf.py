@@ -37,7 +37,11 @@ version = release = tomllib.loads((HERE.parent / "pyproject.toml").read_text("ut
     "version"
 ]
 
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx-mathjax-offline"]
+extensions = [
+    *("myst_nb", "sphinx.ext.autodoc", "sphinx.ext.mathjax"),
+    *("sphinx-mathjax-offline", "sphinx_copybutton"),
+]
+copybutton_prompt_text = "$ "
 exclude_patterns = ["_build", "conf.py", "studies"]
 html_theme = "furo"
 html_title = f"dualball {version}"
