@@ -60,9 +60,8 @@ class Entry:
     """Processor time at the quick level on some machine, of the engine on trial."""
 
 
-PACE = {Role.IN_THE_LIMIT: 0.25, Role.AS_IT_COMES: 10.0}
-"""How much longer others take for as many steps: they have no law to solve; but a free ball in
-facets settles slowly."""
+LAWLESS = 0.25
+"""Processor time of a step without the law, divided by that of one with it."""
 HOPS = "hops that last are those of the set hopping"
 # fmt: off
 PLAN: dict[str, Entry] = {

@@ -17,9 +17,9 @@ from graphlib import TopologicalSorter
 from pathlib import Path
 
 from compare.kit import record
-from compare.kit.engines import Engine
+from compare.kit.engines import Engine, Role
 from compare.kit.levels import Level
-from compare.kit.plan import PACE, PLAN, planned
+from compare.kit.plan import LAWLESS, PLAN, planned
 from compare.kit.record import Measured, Measurement, Missing, Origin, Planned, Records, Sets
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.tasks import sources
@@ -89,7 +89,8 @@ class Job:
         if not self.runner.has_own_steps:
             return PLAN[name].seconds
         share = len(planned(name, engine, divisor, Level.QUICK)) / len(PLAN[name].trial)
-        return PLAN[name].seconds * share * divisor * PACE.get(engine.role, 1.0)
+        pace = LAWLESS if engine.role is Role.IN_THE_LIMIT else 1.0
+        return PLAN[name].seconds * share * divisor * pace
 
     @cached_property
     def origin(self) -> Origin:

@@ -29,7 +29,7 @@ READY = "getting ready"
 """What is said before anything else is."""
 DRAWING = 0.1
 """Share of a validation's time that drawing its figures takes, about."""
-PATIENCE = 10.0
+PATIENCE = 60.0
 """Processor time, s, of which a validation's pace is taken to be that of the table of costs."""
 LATE = 0.1
 """Share of its cost that a protocol still takes, at least, however long it has taken."""
