@@ -188,7 +188,7 @@ class Difference:
 
 
 def common_times(a: Series, b: Series) -> Array:
-    """Sample times (n,) of the sparser motion while both last; at least `FEWEST`."""
+    """Sample times (n,) of the sparser motion while both last; `InputError` below `FEWEST`."""
     begin, end = max(a.time[0], b.time[0]), min(a.time[-1], b.time[-1])
     times: Array = min((t[(begin <= t) & (t <= end)] for t in (a.time, b.time)), key=len)
     if len(times) < FEWEST:

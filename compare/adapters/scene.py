@@ -37,7 +37,8 @@ class Surface:
     radius: float | None = None
     """Of the cylinder, m; None for a plane."""
     turning: float = 0.0
-    """Of its material about the vertical through `point`, rad/s; a turntable has one."""
+    """Angular velocity of its material about the vertical through `point`, rad/s; a turntable has
+    one."""
     velocity: Vector = (0.0, 0.0, 0.0)
     """Of its material along itself, m/s; a belt has one."""
     restitution: float = 0.0

@@ -82,7 +82,8 @@ class ContactCase(Scene):
         return float(off.max())
 
     def touching(self, states: Array) -> tuple[Array, Array]:
-        """Gap (m) and slip speed (m/s) of states at each contact, (n, contacts); only spheres turn.
+        """Gap (m) and slip speed (m/s) of states (n, 9 or 18) at each contact, (n, contacts); only
+        spheres turn.
 
         A soft contact touches halfway between the body's own surface and the other."""
         body = self.bodies[-1]

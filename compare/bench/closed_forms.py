@@ -204,7 +204,8 @@ def _pressed_to_wall(t: Array, mu: float = MU) -> _Motion:
     until=1.0, scales=(1.0, 1.0, 10.0), contacts=("S", 4.0 / (7 * 0.2 * G), "R"),
     source="Newton and Euler with constant friction mu m g; rolling from t = 2 v/(7 mu g)")
 def _slides_then_rolls(t: Array, mu: float = 0.2, j: float = J) -> _Motion:
-    """A sphere pushed off at 2 m/s without spin: slides until v/r = spin, then rolls."""
+    """A sphere pushed off at 2 m/s without spin: slides until v/r = spin, at 2/(mu g (1 + 1/j)),
+    then rolls."""
     slid = np.minimum(t, 2.0 / (mu * G * (1 + 1 / j)))
     v, s = 2.0 - mu * G * slid, 2.0 * slid - mu * G * slid**2 / 2
     return along(WAY, s + v * (t - slid), v, mu * G * slid / (j * RADIUS), RADIUS * UP)

@@ -78,7 +78,8 @@ def integrated(rates: Callable[[float, Array], Array], start: Array, t: Array) -
     until=0.3, scales=(0.1, 0.5, 5.0), contacts=("S",), source=BALANCE)
 def tripod(t: Array, mu: float = 0.3, height: float = _FOOT + _DOWN, share: float = 1.0,
            start: tuple[float, float] = (0.0, 10.0), pyramid: bool = False) -> _Motion:
-    """Position, velocity and spin of a tripod whose feet bear what keeps it from tilting.
+    """Position, velocity and spin of a tripod of 1 kg each foot of which bears what keeps it from
+    tilting.
 
     At the `start` it goes at 1.5 m/s, so many degrees from the x axis, and turns at so many rad/s.
     The loads N of three feet at p follow from sum N = m g and the two moments of weight and
@@ -125,7 +126,8 @@ _STOP = _MEET + (_SPEED - _ABOVE * G * _MEET) / (_BELOW * G)
     source="Coulomb's law and Newton's third: m mu g drives the plank, mu' (m + M) g brakes it",
     under=_plate(_HEAVIER, 0.0, _PLANK), between=_ABOVE)
 def _dragged(t: Array, above: float = _ABOVE, below: float = _BELOW, load: float = 1.0) -> _Motion:
-    """A block that slides on a plank draws it until both go together, then stop.
+    """A block that slides on a plank slows by mu g and draws the plank until both go together, then
+    stop.
 
     `load` is what of the block's weight the floor bears under the plank."""
     a = max(above * G - below * (_HEAVIER + load) * G, 0.0) / _HEAVIER
@@ -178,7 +180,8 @@ _INCLINE, _DOWNHILL = math.atan(0.3), 0.8
     contacts=("S", (_DOWNHILL + 1.0) / (G * (0.5 * math.cos(_INCLINE) - math.sin(_INCLINE))), "R"),
     source="Coulomb's law against the slip on the belt, integrated by hand")
 def _rides(t: Array, mu: float = 0.5, belt: float = 1.0) -> _Motion:
-    """A block that slides down a belt is slowed until it goes up with the belt."""
+    """A block that slides down a belt is slowed by g (mu cos - sin) until it goes up with the
+    belt."""
     a = G * (mu * math.cos(_INCLINE) - math.sin(_INCLINE))
     slid = np.minimum(t, (_DOWNHILL + belt) / a)
     s = _DOWNHILL * slid - a * slid**2 / 2 - belt * (t - slid)

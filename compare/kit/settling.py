@@ -41,7 +41,7 @@ time 1/c. (Twenty times what it was before settled states of rigid contacts had 
 creep by as much.)"""
 FORCES = tuple(f"force_{contact}{axis}" for contact in "AB" for axis in "xyz")
 SUMS = ("force_Az", "force_Bz", "force_Ax-By", "force_Ay+By", "force_Bx+By")
-"""What mechanics determine of the forces in RR: the rest is a family."""
+"""What mechanics determine of the forces in RR: the rest is a family of one parameter."""
 ERROR_GROUPS = (
     ("omega_c",),
     ("slip_x", "slip_y", "slip_z", "wall_spin"),
@@ -75,7 +75,7 @@ class SettlingCriteria:
     span: float = SPAN
     """Length of a round in units of 1/c."""
     loose: float = 1.0
-    """How many times the limit for comparison with theory a state may drift and swing."""
+    """A settled state may drift and swing up to so many times the limit for a comparison."""
     sharp: float = math.inf
     """As long as there are rounds, one that exceeds so many times that limit goes on."""
     rounds: Sequence[float] = ()
@@ -292,6 +292,6 @@ def physical_case(case: Case) -> Case:
 
 
 def settled_cases(records: Records, set: str, how: str) -> dict[float, Case]:
-    """The cases to which a ball of a set settled from a start, by flow, slowest first."""
+    """The cases to which a ball of a set settled from a start, by flow, rad s-1, slowest first."""
     found = records.select("settled", "case", lambda m: m.set == set and m.text("start") == how)
     return dict(sorted((m.parameters.omega_0, physical_case(Case(int(m.value)))) for m in found))

@@ -95,7 +95,7 @@ def check_size(axes: Sequence[Axis], unit: str) -> None:
 
 
 def grid(p: Parameters, axes: Sequence[Axis]) -> Iterator[Parameters]:
-    """Every combination of the axes' values, the last axis fastest; at most `MOST`."""
+    """Every combination of the axes' values, the last axis fastest; `InputError` beyond `MOST`."""
     check_size(axes, "runs")
     for values in itertools.product(*(axis.points for axis in axes)):
         yield p.replace(**dict(zip((axis.name for axis in axes), values, strict=True)))

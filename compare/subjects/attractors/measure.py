@@ -288,10 +288,10 @@ def rebounding(runner: Runner, sets: Sets, records: Records) -> Measured:
 
 
 def death(etas: Sequence[float], factors: Sequence[Sequence[float]]) -> Estimate:
-    """The wall friction at which disturbances don't change, by lines through eta (n,).
+    """The wall friction at which disturbances neither grow nor shrink, by lines through eta (n,).
 
-    Factors are those with the coarser step, with the finer one, and in a later part of the run with
-    the finer one."""
+    Factors (n, 3) are those with the coarser step, with the finer one, and in a later part of the
+    run with the finer one."""
     slow, fast, later = (
         float(np.polyfit(np.array(each) - 1, etas, 1)[-1]) for each in zip(*factors, strict=True)
     )

@@ -43,7 +43,7 @@ def _spectrum(m: Measurement) -> tuple[complex, ...]:
 
 
 def _mode(m: Measurement) -> complex:
-    """The eigenvalue of theory for a mode, by its number in the order of frequency."""
+    """The eigenvalue of theory for a mode, by its number in order of frequency, rad s-1."""
     values = _spectrum(m)
     real = 1e-9 * max(map(abs, values))  # round-off in the imaginary part of one that is real
     upper = sorted((v.imag if v.imag > real else 0.0, -v.real) for v in values if v.imag >= -real)

@@ -98,7 +98,7 @@ def draw_plane(plane: Diagram) -> tuple[Figure, str]:
 
 
 def regions(axes: Axes, p: Parameters, equal: bool, highest: float = 0.0) -> None:
-    """Draw which cases exist over friction and flow, to a flow at least, and thresholds."""
+    """Draw which cases exist over friction and flow, at least to `highest`, rad s-1; thresholds."""
     eta = np.linspace(0.0, _WIDEST, 801)
     mu = eta if equal else np.full(eta.shape, p.mu)
     # lower ones set no scale

@@ -470,7 +470,7 @@ def _jump(runner: Runner, start: Start, size: float) -> StepPair:
 
 
 def _ramps(runner: Runner, start: Start, begins: float, ends: float) -> Iterator[StepPair]:
-    """Step pairs of ramps of the flow between two flows, from settled SS."""
+    """Step pairs of ramps, rad s-2, between two flows, rad s-1, from settled SS."""
     p, span = start.p, ends - begins
     last = begins + RAMP[1] * span
     for rate in runner.sampling.unsteady_rates:
