@@ -58,8 +58,7 @@ class Sampling:
     # settling: lengths of successive rounds, in units of `settling.SPAN`. The later ones are
     # longer, because a ball on the wall that goes on from its mean swings again, if less, and that
     # has to die out, too.
-    settling_rounds: tuple[float, ...] = (1.0, 2.0, 2.0)
-    settling_steps: int = 2048  # a round is a multiple of so many coarse time steps
+    settling_rounds: tuple[float, ...] = (1.0, 1.0, 2.0, 2.0)
 
     # settled: flows omega_0 sqrt(R/g) for every kind of start, the first one that which comes to
     # slip
@@ -73,7 +72,7 @@ class Sampling:
     thresholds_width: float = 5e-5  # relative width of the last brackets
     thresholds_fold: float = 6e-4  # and of those about a fold
     thresholds_loose: float = 10.0  # factor on the settling tolerance
-    thresholds_rounds: tuple[float, ...] = (1.0, 2.0, 2.0)
+    thresholds_rounds: tuple[float, ...] = (1.0, 1.0, 2.0, 2.0)
 
     edge_flows: Flows = (0.3,)  # parts of the way from omega_02 to omega_04
     edge_lines: int = 3  # for each edge
@@ -161,7 +160,7 @@ AT_FULL = replace(
 OWN_STEPS = replace(
     # the same run twice: all numbers are extrapolated to no step from several steps
     AT_QUICK, halves=(2, 2), granted=True, slow=False,
-    settling_rounds=(0.45, 1.0, 1.0), settling_steps=512,
+    settling_rounds=(0.45, 1.0, 1.0),
     settled_starts=(("with the fluid", (0.62, 1.7, 4.2)), ("on the wall", (1.7, 4.2))),
     settled_loose=100.0,
     settled_divisor=1,

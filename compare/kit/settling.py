@@ -33,6 +33,8 @@ LONGEST = 2.0
 SHORT = (1 / 64, 1 / 8)
 """Rounds before those where the law isn't Stokes': other drag laws are stronger, so balls settle
 sooner. The drift limit of such a round is reduced in proportion to its length."""
+STARTED_NEAR = 1 / 4
+"""The round before those where a ball begins from what it settled to with a longer step."""
 STEPS_A_SAMPLE = 8
 """A coarse step is about a twentieth of sqrt(R/g), and the ball goes round more slowly."""
 SOLVED = 2e-11
@@ -91,7 +93,7 @@ def settle(
     goes on from its mean, but at the height from which it started: the motion of a ball on the wall
     alone does not depend on its height, and one that sinks must not land."""
     rounds = criteria.rounds or runner.sampling.settling_rounds
-    span, loose, steps = criteria.span, criteria.loose, runner.sampling.settling_steps
+    span, loose = criteria.span, criteria.loose
     left = [[*(SHORT if start.p.drag != STOKES else ()), *rounds] for start in starts]
     if runner.engine.relative_tolerance:
         loose, left = math.inf, [[rounds[0]] for _ in starts]
@@ -100,7 +102,7 @@ def settle(
     while todo:
         tasks = []
         for n, start in todo.items():
-            step, t_end = coarse_step(start.p), duration(start.p, span * left[n].pop(0), steps)
+            step, t_end = coarse_step(start.p), duration(start.p, span * left[n].pop(0))
             samples = round(t_end / (STEPS_A_SAMPLE * step))
             tasks.append(
                 runner.task(start.p, start.x0, t_end, step / criteria.divisor, samples=samples)
@@ -114,7 +116,7 @@ def settle(
                 )
                 continue
             state = states[n] = judge_run(start, task, run, loose)
-            part = task.t_end / duration(start.p, span, steps)
+            part = task.t_end / duration(start.p, span)
             if left[n] and state.excess > min(part, 1.0) * min(loose, criteria.sharp):
                 # A part of a round may end on the way to where the ball settles: it goes on as it
                 # is.
@@ -199,7 +201,9 @@ def settle_finer(
     for state in states:
         x0 = State.of(state.mean)._replace(y=max(State.of(state.start.x0).y, 0.0))
         starts.append(replace(state.start, x0=x0.stacked()))
-    return settle(runner, starts, replace(criteria, divisor=divisor * criteria.divisor))
+    rounds = STARTED_NEAR, *(criteria.rounds or runner.sampling.settling_rounds)
+    finer = replace(criteria, divisor=divisor * criteria.divisor, rounds=rounds)
+    return settle(runner, starts, finer)
 
 
 def not_found_again(coarse: SteadyState, fine: SteadyState) -> str:
@@ -250,11 +254,11 @@ def settled_readings(runner: Runner, protocol: str, starts: Sequence[Start]) -> 
         yield measurement(runner, protocol, name, p, "omega_c", read, [fine.task])
 
 
-def duration(p: Parameters, span: float = SPAN, steps: int = 2048) -> float:
+def duration(p: Parameters, span: float = SPAN) -> float:
     """Length of a round, s: at least 8 turns of the fluid, in whose rhythm balls swing.
 
-    A multiple of so many coarse steps: for batches of alike runs, as is `rounded_duration`."""
-    unit = steps * coarse_step(p)
+    A multiple of 512 coarse steps: for batches of alike runs, as is `rounded_duration`."""
+    unit = 512 * coarse_step(p)
     turns = 8 * 2 * math.pi / abs(p.omega_0) if p.omega_0 else 0.0
     return unit * math.ceil(max(span / p.c, turns) / unit)
 

@@ -220,7 +220,7 @@ class Simulation:
     def __init__(self, model: Any, law: Law) -> None:
         self.record: Any = np.zeros(1, MEMORY)
         self.address = int(self.record.ctypes.data)
-        self._arrays: dict[str, npt.NDArray[Any]] = {}
+        self._arrays: dict[int, npt.NDArray[Any]] = {}  # by their addresses
         record, radius = self.record, model.geom_rbound
         record["law"], record["address"] = law.record(), self.address
         record["model"] = model._address
@@ -247,8 +247,9 @@ class Simulation:
 
     def _own(self, name: str, array: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Keep an array, and tell its address."""
-        self._arrays[name] = array
-        self.record[f"{name}_at"] = array.ctypes.data
+        address = array.ctypes.data
+        self._arrays.pop(int(self.record[f"{name}_at"][0]), None)
+        self._arrays[address], self.record[f"{name}_at"] = array, address
         return array
 
     def make_room(self, contacts: int, rows: int, jacobian: int) -> None:
@@ -264,16 +265,14 @@ class Simulation:
                 continue
             count += count // 2
             self.record[f"room_{room}"] = count
-            old = {name: self._array(name) for name in kinds[room]}
             for name, kind in kinds[room].items():
-                longer = self._own(name, np.zeros(count, kind))
-                longer[: len(old[name])] = old[name]
+                longer, old = np.zeros(count, kind), self._array(name)
+                longer[: len(old)] = old
+                self._own(name, longer)
 
     def _array(self, name: str) -> npt.NDArray[Any]:
         """The array whose address the record has: steps exchange contacts and those before."""
-        address = int(self.record[f"{name}_at"][0])
-        found = [each for each in self._arrays.values() if each.ctypes.data == address]
-        return found[0] if found else np.zeros(0)
+        return self._arrays.get(int(self.record[f"{name}_at"][0]), np.zeros(0))
 
     def reset(self) -> None:
         """Forget all, as at the start."""

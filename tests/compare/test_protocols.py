@@ -295,7 +295,7 @@ def test_what_quadratic_drag_does_not_settle_has_no_values(runner, monkeypatch):
 def test_what_swings_for_ever_settles_by_going_on_from_its_mean(runner, monkeypatch):
     """A ball that sinks along the wall: also where a round is rounded to another length than the
     usual one."""
-    make(monkeypatch, settling_rounds=(0.45, 1.0, 1.0), settling_steps=512)
+    make(monkeypatch, settling_rounds=(0.45, 1.0, 1.0))
     p = QUICK["rough-floor"].replace(omega_0=21.74)
     (state,) = settling.settle(
         runner, [settling.initial_condition("rough-floor", p, "on the wall")]
