@@ -80,12 +80,12 @@ def pulsation(runner: Runner, sets: Sets, records: Records) -> Measured:
     """Gain and phase of rolling; the amplitude at which slip begins; the mean reading beyond it."""
     small = []  # about a flow at which a ball rolls, at several frequencies
     for name, p in sets.items():
-        if (end := _threshold(records, name, "omega_01")) is None:
+        if (rolls := records.threshold(name, "omega_01")) is None:
             why = "no flow was measured at which two-point rolling ends by slipping"
             yield Missing("pulsation", name, why)
             continue
-        q = p.replace(omega_0=ROLLS_AT * end)
-        room, lowest = end - q.omega_0, _lowest(p)
+        q = p.replace(omega_0=ROLLS_AT * rolls.value)
+        room, lowest = rolls.value - q.omega_0, _lowest(p)
         octaves, reach = runner.sampling.pulsation_octaves, runner.sampling.pulsation_reach * room
         small += [Pulsation(name, q, lowest * 2.0**n, 0.5 * room, reach) for n in octaves]
     followed = _as_followed(runner, small)
@@ -123,11 +123,11 @@ def pulsation(runner: Runner, sets: Sets, records: Records) -> Measured:
 
 def _strong(name: str, p: Parameters, records: Records) -> Iterator[tuple[Pulsation, float]]:
     """Pulsations by several times the mean flow, under Stokes' law, and amplitudes."""
-    end = _threshold(records, name, "omega_01")
-    if end is not None and p.drag == STOKES:
+    end = records.threshold(name, "omega_01")
+    if end and p.drag == STOKES:
         frequency = _lowest(p) * 2.0**OCTAVE
         for share, times in STRONG:
-            q = p.replace(omega_0=share * end)
+            q = p.replace(omega_0=share * end.value)
             amplitude = times * q.omega_0
             yield Pulsation(name, q, frequency, amplitude, amplitude), amplitude
 
@@ -379,13 +379,6 @@ def _slips(cases: npt.NDArray[np.int8]) -> str:
     return "at one point" if seen - {Case.RR} else "nowhere"
 
 
-def _threshold(records: Records, set: str, threshold: str) -> float | None:
-    """The flow, rad s-1, measured as this threshold of a set, or None."""
-    return next(
-        (m.value for m in records.select("thresholds", threshold, lambda m: m.set == set)), None
-    )
-
-
 def jumps(runner: Runner, sets: Sets, records: Records) -> Measured:
     """Delay, peak and height after jumps, rolling and slipping; where a ramp ends slip."""
     # where slipping begins, the wall carries the ball, a jump ends
@@ -394,19 +387,20 @@ def jumps(runner: Runner, sets: Sets, records: Records) -> Measured:
     pairs = list[StepPair]()
     starts = list[Start]()
     for name, p in sets.items():
-        begins, holds, ends = (_threshold(records, name, f"omega_0{n}") for n in (1, 2, 4))
-        if begins is None or holds is None:
+        slips, carries, folds = (records.threshold(name, f"omega_0{n}") for n in (1, 2, 4))
+        if slips is None or carries is None:
             why = "no flows were measured between which the ball slips at both points"
             yield Missing("unsteady", name, why)
             continue
-        flows[name] = begins, holds, ends or math.nan
+        begins, holds, ends = slips.value, carries.value, folds.value if folds else math.nan
+        flows[name] = begins, holds, ends
         if p.drag == STOKES:  # with other laws the delay depends on the size of the jump
             q = p.replace(omega_0=ROLLS_AT * begins)
             rolls = Start(name, q, "RR", State(omega_c=q.omega_0).stacked())
             pairs.append(_jump(runner, rolls, JUMP * q.omega_0))
         q = p.replace(omega_0=begins + SLIPS_AT * (holds - begins))
         starts.append(Start(name, q, "jump", np.zeros(8)))
-        if ends is None:
+        if folds is None:
             why = "no flow was measured at which slipping at both points ends in a jump"
             yield Missing("unsteady", name, why)
         else:
