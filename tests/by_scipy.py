@@ -1,14 +1,15 @@
 """Event-driven runs of theory with the integrators of scipy, in plain Python: held against compiled
 runs, and in their place where a wrong theory is believed.
 
-By LSODA, except while a slip is small: its direction is stiff then, which LSODA doesn't detect
-where hardly anything else moves, and BDF takes over."""
+By LSODA or another fast method, except while a slip is small: its direction is stiff then, which
+LSODA doesn't detect where hardly anything else moves, and BDF takes over."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 from unittest import mock
 
@@ -28,21 +29,24 @@ MAX_RESTARTS = 20
 
 
 @contextmanager
-def runs_by_scipy() -> Iterator[None]:
-    """For as long as the context lasts."""
+def runs_by_scipy(fast: Any = LSODA) -> Iterator[None]:
+    """For as long as the context lasts; slips that aren't small by the fast method."""
     plain = getattr(hybrid.run_through_flow, "py_func", hybrid.run_through_flow)
-    with mock.patch.multiple(hybrid, run_through_flow=plain, stretch=stretch):
+    by_it = partial(stretch, fast)
+    with mock.patch.multiple(hybrid, run_through_flow=plain, stretch=by_it):
         yield
 
 
-def stretch(of: Stretch, pace: Pace, taken: int, most: int) -> tuple[int, Pace, int, int]:
+def stretch(
+    fast: Any, of: Stretch, pace: Pace, taken: int, most: int
+) -> tuple[int, Pace, int, int]:
     """In the place of `integrator.stretch`."""
     start, tau, first, small, slow = pace
     t, steps, failures = start + tau, 0, 0
     if slow and (end := finish_straight(t, of, taken)) >= 0:
         return DONE, pace, -1, end
     while t < of.until:
-        slow, method = 0, BDF if small else LSODA
+        slow, method = 0, BDF if small else fast
         try:
             for step in _steps(method, t, of, taken, first):
                 (t, guard, taken), first, steps = step, 0.0, steps + 1

@@ -68,10 +68,11 @@ def load(path: Path, keyframe: str | None = None) -> tuple[Any, Any]:
             f"cannot read {path}: "
             f"{'it is a directory' if path.is_dir() else 'there is no such file'}"
         )
+    try:  # MuJoCo takes a name as UTF-8, also where Python's file system has another encoding
+        name = os.fsencode(path).decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise StorageError(f"cannot read {path}: MuJoCo takes no name but in UTF-8") from error
     try:
-        # MuJoCo takes the bytes of a name as UTF-8, also where Python's file system has another
-        # encoding.
-        name = os.fsencode(path).decode("utf-8", "surrogateescape")
         _check_sizes(_heightfields(path))
         _check_sizes(_sizes(mujoco.MjSpec.from_file(name)))
         model = mujoco.MjModel.from_xml_path(name)

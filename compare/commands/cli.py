@@ -57,13 +57,23 @@ def program() -> NoReturn:
     sys.exit(code)
 
 
+LONGEST = 2000
+"""Characters of a refusal, at most."""
+
+
+def _brief(said: str) -> str:
+    """What is said of a mistake, without the middle if it repeats something huge."""
+    half = LONGEST // 2
+    return said if len(said) <= LONGEST else f"{said[:half]} … {said[-half:]}"
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the program with arguments, the process's own for None; return its exit code."""
     args = argparse.Namespace(resumes=False)
     try:
         return _run(sys.argv[1:] if argv is None else argv, args)
     except InputError as error:
-        print(f"dualball: error: {error}", file=sys.stderr)
+        print(f"dualball: error: {_brief(str(error))}", file=sys.stderr)
         return 2
     except SimulationError as error:
         print(f"dualball: {error}", file=sys.stderr)

@@ -279,7 +279,7 @@ def no_empty_directories(args: argparse.Namespace) -> Iterator[None]:
 
 
 NARROWEST = 40
-"""Columns of a terminal below which tables would lose what they hold."""
+"""Columns of a terminal below which text isn't broken further."""
 
 
 def terminal(**look: Any) -> Console:
@@ -306,10 +306,10 @@ def show(data: Any, as_json: bool, *shown: Any) -> None:
         return
     console = terminal(markup=False)
     if sys.stdout.isatty():
-        console.print(*shown, sep="\n")
+        console.print(*shown, sep="\n", crop=False)
         return
     with console.capture() as text:  # tables are filled up with blanks, which no file needs
-        console.print(*shown, sep="\n")
+        console.print(*shown, sep="\n", crop=False)
     print("\n".join(line.rstrip() for line in text.get().splitlines()))
 
 

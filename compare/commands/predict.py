@@ -43,16 +43,12 @@ def show_parameters(args: argparse.Namespace) -> int:
             | row
             | {"unit": meta["unit"], "range": allowed, "meaning": meta["meaning"]}
         )
-    shown = Table("option", "value", "unit", "range", "meaning", box=None)
+    cells = [["option", "value", "unit", "range", "meaning"]]
     for row in rows:
-        shown.add_row(
-            row["option"],
-            f"{row['value']:.6g}",
-            readable(row["unit"]),
-            row["range"],
-            row["meaning"],
-        )
-    shown.add_row("--drag", p.drag, "", "", f"law of drag: {', '.join(LAWS)}")
+        value, unit = f"{row['value']:.6g}", readable(row["unit"])
+        cells.append([row["option"], value, unit, row["range"], row["meaning"]])
+    cells.append(["--drag", p.drag, "", "", f"law of drag: {', '.join(LAWS)}"])
+    shown = pages.table("", cells, justify="left", box=None)
     others = [name for name in Parameters.names() if args.parameters or name != args.set]
     own = f"Values of {args.parameters or args.set}; other sets: {', '.join(others)}."
     toml = (

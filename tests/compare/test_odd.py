@@ -25,7 +25,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from compare.bench import settled
 from compare.commands import cli, options
+from model import InputError
 from tests.commands import COMMANDS, NEEDED, ROOT, parser_of, refused
 
 ODD = ["", *"x nan -inf 0 -1 1e300 1e-300 1,5 ½ 1_000 0x10 99999999999999999999".split()]
@@ -410,13 +412,32 @@ def test_what_users_may_write_is_one_line(here, monkeypatch, capsys):
     assert contents(here) == before
 
 
-@pytest.mark.parametrize("columns", ["0", "3", "x", "-5"])
-def test_tables_lose_nothing_in_a_terminal_of_any_width(columns, monkeypatch, capsys):
-    monkeypatch.setenv("COLUMNS", columns)
-    assert cli.main(["predict"]) == 0
-    shown = capsys.readouterr().out
-    assert "13.562" in shown
-    assert "lags" in shown
+@pytest.mark.parametrize("line", ["predict", "calibrate --set reference", "parameters", "cases"])
+def test_tables_lose_nothing_in_a_terminal_of_any_width(line, monkeypatch, capsys):
+    def words(columns: str) -> set[str]:
+        monkeypatch.setenv("COLUMNS", columns)
+        assert cli.main(line.split()) == 0
+        return set(capsys.readouterr().out.split())
+
+    whole = {word for word in words("1000") if word.strip("─")}
+    assert not [
+        (columns, lost) for columns in "0 3 20 60 x -5".split() if (lost := whole - words(columns))
+    ]
+
+
+@pytest.mark.parametrize("line", ["predict --set {}", "cases {}", "{}", "compare {} --set air"])
+def test_what_is_huge_is_not_repeated(line, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("huge.csv").write_bytes(b"\0" * 100_000)
+    said = refused(capsys, *line.format("huge.csv" if "air" in line else "x" * 10_000).split())
+    assert len(said) < 1.1 * cli.LONGEST
+
+
+def test_a_name_that_mujoco_cannot_read_is_refused(tmp_path):
+    scene = tmp_path / os.fsdecode(b"\xff.xml")
+    scene.write_text("<mujoco/>")
+    with pytest.raises(InputError, match="no name but in UTF-8"):
+        settled.load(scene)
 
 
 def test_a_directory_that_was_deleted_is_one_line(tmp_path):

@@ -6,7 +6,7 @@ import codecs
 import re
 import sys
 import unicodedata
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -142,12 +142,22 @@ def markdown(rows: Rows) -> str:
     )
 
 
+def least_width(cells: Iterable[str], whole: bool = False) -> int:
+    """Columns of a terminal that a table's column needs: for its longest word, or `whole` cells."""
+    from rich.cells import cell_len  # here, because help has no tables
+
+    shown = [for_terminal(cell) for cell in cells]
+    return max(map(cell_len, shown if whole else " ".join(shown).split()), default=0)
+
+
 def pairs(rows: Mapping[str, str]) -> Table:
     """A table of two columns for the terminal: names, and what they stand for."""
     from rich.table import Table  # here, because help has no tables
     from rich.text import Text
 
     shown = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
+    for column in ({*rows}, {*rows.values()}):
+        shown.add_column(min_width=least_width(column))
     for name, text in rows.items():
         shown.add_row(Text(for_terminal(name), "bold"), Text(for_terminal(text)))
     return shown
@@ -174,8 +184,11 @@ def table(
     }
     shown = Table(title=title, **({"box": box.SIMPLE_HEAD} | usual | look))
     for k, name in enumerate(rows[0]):
-        words = rows[1:] and all(str(row[k])[:1].isalpha() for row in rows[1:])
-        shown.add_column(for_terminal(str(name)), justify="left" if k == 0 or words else justify)
+        cells = [str(row[k]) for row in rows[1:]]
+        words = cells and all(cell[:1].isalpha() for cell in cells)
+        least = max(least_width([str(name)]), least_width(cells, whole=no_wrap and k > 0))
+        side = "left" if k == 0 or words else justify
+        shown.add_column(for_terminal(str(name)), justify=side, min_width=least)
     for row in rows[1:]:
         texts = (
             Text(for_terminal(cell), no_wrap=no_wrap and k > 0) if isinstance(cell, str) else cell
