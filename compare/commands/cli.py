@@ -57,14 +57,14 @@ def program() -> NoReturn:
     sys.exit(code)
 
 
-LONGEST = 2000
+MOST_SAID = 2000
 """Characters of a refusal, at most."""
 
 
 def _brief(said: str) -> str:
     """What is said of a mistake, without the middle if it repeats something huge."""
-    half = LONGEST // 2
-    return said if len(said) <= LONGEST else f"{said[:half]} … {said[-half:]}"
+    half = MOST_SAID // 2
+    return said if len(said) <= MOST_SAID else f"{said[:half]} … {said[-half:]}"
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -35,7 +35,7 @@ def told(what: str) -> Iterator[Callable[[float], None]]:
             while not ended.wait(OFTEN):
                 compiles.listen()
                 if compiles.now:
-                    show(f"{what}: compiling, once on this machine", 0, 0, 0)
+                    show(f"{what}: compiling, {compiles.now}", 0, 0, 0)
                 else:
                     show(what, round(1000 * done), 1000 if done else 0, 0)
 
@@ -65,10 +65,17 @@ class _Compiling:
             self._events.register("numba:compile", self._heard)
 
     @property
-    def now(self) -> bool:
-        """Whether more has begun than ended."""
-        of = self._heard.buffer if self._heard else ()
-        return sum(1 if event.is_start else -1 for _, event in tuple(of)) > 0
+    def now(self) -> str:
+        """How often, if more has begun than ended."""
+        begun = list[Any]()
+        for _, event in tuple(self._heard.buffer) if self._heard else ():
+            begun = [*begun, event] if event.is_start else begun[:-1]
+        if not begun:
+            return ""
+        cache = begun[0].data["dispatcher"]._cache
+        if isinstance(cache, sys.modules["numba.core.caching"].NullCache):
+            return "each time: no place to keep it; NUMBA_CACHE_DIR can name one"
+        return "once on this machine"
 
     def end(self) -> None:
         """Listen no more."""

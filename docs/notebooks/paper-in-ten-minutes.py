@@ -41,7 +41,7 @@ MUJOCO = {"color": "black", "lw": 1, "ls": ":"}
 p = Parameters.named("reference")
 for field in p.quantities():
     unit, meaning = field.metadata["unit"], field.metadata["meaning"]
-    print(f"{field.name:>8} = {getattr(p, field.name):<6g} {unit:<9} {meaning}")
+    print(f"{field.name:>13} = {getattr(p, field.name):<6g} {unit:<9} {meaning}")
 
 # %% [markdown]
 # ## Where the motion changes
