@@ -84,7 +84,7 @@ class Sampling:
     hysteresis_parts: int = 2  # of a gap in which a case changes
     slope_slipping: int = 2  # slipping states of a set at which it is measured, at most
 
-    unsteady_lasts: float = 48.0  # time after a jump in units of 1/c
+    unsteady_lasts: float = 32.0  # time after a jump in units of 1/c
     unsteady_divisors: tuple[int, int] = (2, 4)  # its time steps in a coarse one
     unsteady_ramps: tuple[int, int] = (1, 2)  # those of ramps
     # of ramps, in c times the range of flows in which the ball slips
@@ -127,7 +127,7 @@ AT_DEFAULT = replace(
     plane_spread=160, plane_added=(60, 60, 60),
     hysteresis_hold=60.0, hysteresis_parts=4,
     slope_slipping=20,
-    unsteady_rates=(2.5e-3, 5e-3, 1e-2),
+    unsteady_lasts=48.0, unsteady_rates=(2.5e-3, 5e-3, 1e-2),
     pulsation_octaves=(0, 1, 3, 4, 6, 7), pulsation_steps=1024, pulsation_width=2.5e-4,
     unloading_divisors=(32, 64),
     recurrent_flows=(1.0, 0.95, 0.91, 0.87, 0.83, 0.80),
