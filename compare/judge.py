@@ -169,6 +169,7 @@ def select(claims: Iterable[Claim], ids: Sequence[str] | None) -> list[Claim]:
     for name in ids or ():
         if name not in known:
             raise InputError(
-                f"no claim is called {name!r}{suggestion(name, known)}; list them with --list"
+                f"no claim is called {name!r}{suggestion(name, known)}; "
+                "'dualball validate --list' lists them"
             )
     return [known[name] for name in (ids or known)]
