@@ -30,7 +30,8 @@ PHASES, CLOSER = 360, 32
 margin."""
 HARMONICS, FINE = 32, 128
 """Odd harmonics of the lag that are computed (drag is an odd function); those left out are some
-1e-6 of it, or 1e-7."""
+1e-6 of it, or `LEFT_OUT`."""
+LEFT_OUT = 1e-7
 LAG_STEPS, SOLVED = 50, 1e-9
 """Most steps of Newton's method for it, and the largest residual, divided by the flow's
 acceleration."""

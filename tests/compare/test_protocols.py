@@ -1,6 +1,7 @@
 """Protocols find what is known to be there, and say what broke down, did not settle or isn't
 there."""
 
+import itertools
 import math
 from dataclasses import replace
 from types import SimpleNamespace
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 import analytic
+from analytic.flowmeter import pulsation
 from compare.catalogue import CLAIMS
 from compare.claim import Outcome
 from compare.judge import judge, select
@@ -16,7 +18,7 @@ from compare.kit import levels, settling
 from compare.kit.brackets import FINER, LONGER, USUAL, Bracket, Search, narrow
 from compare.kit.levels import Level, sets
 from compare.kit.quantities import QUANTITIES
-from compare.kit.record import Missing, Records
+from compare.kit.record import Missing, Records, state_of
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.statistics import (
@@ -32,11 +34,12 @@ from compare.kit.step_pairs import of_no_step, unlike
 from compare.subjects.attractors import measure as attractors
 from compare.subjects.flowmeter import measure as flowmeter
 from compare.subjects.motion import measure as moving
+from compare.subjects.regions import measure as regions
 from compare.subjects.slipping import measure as slipping
 from compare.subjects.stationary import measure as settled
 from compare.subjects.thresholds import measure as thresholds
 from compare.subjects.unsteady import measure as unsteady
-from model import Case, Parameters, State
+from model import Case, Flow, Parameters, State
 from tests.measured import measured, motion
 from tests.measured import thresholds as known
 
@@ -216,6 +219,57 @@ def test_what_changes_by_little_among_what_changes_by_much_is_not_sure():
     assert unlike(np.zeros(0)).size == 0
 
 
+def test_a_pair_of_steps_shows_the_error_of_an_engine_that_has_none(runner):
+    """Its tolerance takes the place of the step, and neither may the pair see too little."""
+    lasts, x = 4.0, State(omega_c=3.0, slip_x=40.0, slip_y=15.0, slip_z=-30.0).stacked()
+    truth = analytic.simulate(P, x, lasts, rtol=1e-11)
+    coarse, fine = (
+        float(run.omega_c[-1])
+        for run in runner.each([runner.task(P, x, lasts, coarse_step(P) / n) for n in (1, 2)])
+    )
+    error = of_no_step(coarse, estimate(fine))
+    assert 0 < abs(error.value - truth.omega_c[-1]) <= COVERAGE * error.uncertainty < 1e-6
+
+
+def test_a_ball_goes_on_with_round_off_into_the_floor(runner):
+    x = State(omega_c=1.0, v_y=-1e-14).stacked()
+    (run,) = runner.each([runner.task(P, x, 1.0, coarse_step(P))])
+    assert run.complete
+
+
+def test_no_law_of_drag_without_a_fold_is_given_a_drag_at_which_it_is_born(runner):
+    sets = {name: QUICK[name] for name in ("reference", "blunt")}
+    ends = [known(name, p, "omega_01", "omega_02").rows for name, p in sets.items()]
+    found = Records.of(regions.birth(runner, sets, Records(tuple(itertools.chain(*ends)))))
+    (born,), (none,) = found.measurements, found.missing
+    expected = analytic.bifurcation.diagram.critical_drag(P)
+    assert abs(born.value - expected) <= COVERAGE * born.uncertainty < 1e-2 * expected
+    assert (none.set, none.reason) == ("blunt", "no drag gives birth to a fold")
+
+
+def test_sampling_seldom_changes_a_jump_and_a_ramp_by_no_more_than_they_are_unsure():
+    p = P.replace(omega_0=1.2 * analytic.thresholds(P).omega_01)
+    x = analytic.solution(p, Case.SS).state.stacked()
+
+    def height(samples):
+        up, down = (
+            analytic.simulate(
+                p.replace(omega_0=(1 + side) * p.omega_0), x, 12.0, sample_interval=12.0 / samples
+            )
+            for side in (1e-4, -1e-4)
+        )
+        return unsteady._jump_quantities(up, down)["jump_height"]
+
+    seldom, often = height(1500), height(24_000)
+    assert 1e-6 < abs(seldom.value - often.value) <= COVERAGE * seldom.uncertainty < 1e-2
+    flow = Flow.ramp(p.omega_0, 1.2 * analytic.thresholds(P).omega_04, 120.0)
+    once, again = (
+        unsteady.caught_up(analytic.simulate(p, x, 120.0, flow, sample_interval=120.0 / samples))
+        for samples in (4000, 16_000)
+    )
+    assert once == pytest.approx(again, rel=1e-8)
+
+
 def test_a_settled_state_is_no_surer_than_solving_at_random_leaves_it():
     """Also where neither half the step nor other starts change it; what is measured takes the place
     of what errors of one sign could come to."""
@@ -328,6 +382,31 @@ def test_a_ball_keeps_to_its_branch_of_the_loop(Omega_0, case, before, outcome):
         measured("hysteresis", what, *value, q, "slipping", **at) for what, value in values.items()
     )
     assert outcome_of("fig-13-left", *rows) is outcome
+
+
+def test_a_prediction_is_no_surer_than_its_computation(monkeypatch):
+    """A number without an error of its own agrees with one computed more sharply, and with no
+    other."""
+    blunt = QUICK["blunt"].replace(omega_0=4.0)
+    thrown, time = State(y=3.0, v_y=0.7, omega_c=7.0, slip_x=42.0, slip_y=-56.0, h=0.03), 0.2
+    end = analytic.simulate(blunt, thrown.stacked(), time, rtol=1e-11).slip_x[-1]
+    at = {"f": 1.0, "amplitude": 13.0}
+    monkeypatch.setattr(pulsation, "FINE", 512)
+    gain = abs(pulsation.first_harmonic(blunt, at["amplitude"], at["f"]))
+    monkeypatch.setattr(pulsation, "PERIODIC_RTOL", 1e-9)
+    mean = pulsation.mean_error(blunt, at["amplitude"], at["f"], settled=1e-9)
+    monkeypatch.undo()
+    start = {"start": "thrown", "time": time, **state_of(thrown.stacked())}
+    for claim, protocol, quantity, value, conditions in (
+        ("flight", "runs", "end_slip_x", end, start),
+        ("pulsation-lag", "pulsation", "gain", gain, at),
+        ("pulsation-mean", "pulsation", "mean_error", mean, at | {"slips": "at both points"}),
+    ):
+        for factor, agrees in ((1.0, True), (1.001, False)):
+            row = measured(protocol, quantity, factor * value, 0.0, blunt, "blunt", **conditions)
+            (check,) = judge(select(CLAIMS, [claim]), Records((row,)))[0].checks
+            assert check.agrees is agrees
+            assert check.tolerance > 0
 
 
 def test_numbers_that_no_quick_set_has_are_judged_too():

@@ -11,7 +11,7 @@ import numpy as np
 import analytic
 from analytic.flowmeter import design
 from compare.claim import Criterion, Text, When, all_of, claim, criteria, given
-from compare.judge import simulated, theory
+from compare.judge import integrated, simulated, theory
 from compare.kit.record import Measurement, state
 from compare.kit.settling import physical_case
 from compare.kit.statistics import Estimate
@@ -129,8 +129,7 @@ def _at_event(m: Measurement) -> Estimate:
             "landing_speed": -impulse / m.parameters.m,
         }
         value = values[m.quantity]
-    # errors of 100 steps may have the same sign
-    return Estimate(value, math.hypot(unsure, 100 * RTOL * value))
+    return integrated(value, value, RTOL).also(reading=unsure)
 
 
 OFF = 0.05

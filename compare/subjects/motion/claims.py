@@ -13,9 +13,11 @@ from analytic.mechanics import drag
 from analytic.slipping import slip_stability
 from analytic.slipping.slip_stability import SlipStability
 from compare.claim import Criterion, Text, claim, criteria, given
-from compare.judge import RTOL, simulated, theory
+from compare.judge import RTOL, integrated, simulated, theory
+from compare.kit.quantities import quantity
 from compare.kit.record import Measurement, state
 from compare.kit.settling import forces
+from compare.kit.statistics import Estimate
 from compare.subjects.motion.measure import FLUIDS, LANDED, late_ramp
 from model import Case, Trajectory
 from model.cases import TRAITS
@@ -38,18 +40,22 @@ def _sinking(m: Measurement) -> float:
     return -drag.sinking_speed(**{name: m.at(name) for name in FLUIDS[m.set]})
 
 
-def _fallen(m: Measurement) -> float:
+def _fallen(m: Measurement) -> Estimate:
     """Height, m, of a thrown ball at the end, by the depth whose `fall_time` is the time."""
-    p, (y, v_y, *_) = m.parameters, state(m)
-    fall = brentq(lambda fall: drag.fall_time(fall, v_y, p) - m.at("time"), 1e-6 * p.R, 100 * p.R)
-    return y - float(fall)
+    p, (y, v_y, *_), within = m.parameters, state(m), 1e-12 * m.parameters.R
+
+    def late(fall: float) -> float:
+        return drag.fall_time(fall, v_y, p) - m.at("time")
+
+    return Estimate(y - float(brentq(late, 1e-6 * p.R, 100 * p.R, xtol=within)), within)
 
 
-def _end_of_motion(m: Measurement) -> float:
+def _end_of_motion(m: Measurement) -> Estimate:
     """A state variable of theory's motion at the time at which the measured one ends."""
     flow = late_ramp(m.parameters, m.at("rate"), m.at("time")) if "rate" in m.conditions else None
     motion = simulated(m.parameters, state(m), m.at("time"), flow=flow)
-    return float(getattr(motion, m.quantity.split("_", 1)[1])[-1])
+    value = float(getattr(motion, m.quantity.split("_", 1)[1])[-1])
+    return integrated(value, quantity(m.quantity).size(m.parameters))
 
 
 def _end_states(*starts: str) -> tuple[Criterion, ...]:

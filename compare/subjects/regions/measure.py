@@ -38,6 +38,7 @@ from compare.kit.settling import (
     settle_groups,
 )
 from compare.kit.statistics import (
+    COVERAGE,
     Estimate,
     estimate,
     extrapolated_zero,
@@ -414,7 +415,8 @@ def birth(runner: Runner, sets: Sets, records: Records) -> Measured:
             drag = replace(lag.times(1 / lag.value**2), value=1 / lag.value)
             tasks = [task for end in found[name] for task in end.tasks]
             row = measurement(runner, "birth", name, p, "critical_drag", drag, tasks)
-            yield if_found(row, "no drag gives birth to a fold")
+            sure = lag.value > COVERAGE * lag.uncertainty  # else the drag may have no bound
+            yield row if sure else Missing("birth", name, "no drag gives birth to a fold")
 
 
 PROTOCOLS = (

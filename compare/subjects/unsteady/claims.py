@@ -8,8 +8,9 @@ import math
 import analytic
 from analytic.flowmeter import pulsation, response
 from compare.claim import Criterion, claim, given
-from compare.judge import simulated, theory
+from compare.judge import integrated, simulated, theory
 from compare.kit.record import Measurement, Relation, state
+from compare.kit.statistics import Estimate
 from compare.states import lifts_first, slips_first
 from compare.subjects.unsteady.measure import caught_up
 from model import Case, Flow
@@ -19,11 +20,15 @@ _BY = "analytic.flowmeter"
 _RATE = f"{_BY}.response.rolling_rate"
 
 
-def _gain(m: Measurement) -> complex:
-    """omega_c divided by omega_0 in a pulsation, complex, while the ball rolls."""
+def _followed(m: Measurement) -> tuple[Estimate, Estimate]:
+    """Gain and phase lag, rad, of omega_c in a pulsation, while the ball rolls."""
     if m.parameters.drag == STOKES:
-        return complex(theory(response.transfer, m.parameters, Case.RR, m.at("f")))
-    return theory(pulsation.first_harmonic, m.parameters, m.at("amplitude"), m.at("f"))
+        ratio, left_out = complex(theory(response.transfer, m.parameters, Case.RR, m.at("f"))), 0.0
+    else:
+        ratio = theory(pulsation.first_harmonic, m.parameters, m.at("amplitude"), m.at("f"))
+        left_out = pulsation.LEFT_OUT
+    gain = abs(ratio)
+    return Estimate(gain, left_out), Estimate(-cmath.phase(ratio), left_out / gain)
 
 
 def _onset_criterion(rule: str, relation: Relation) -> Criterion:
@@ -36,7 +41,7 @@ def _onset_criterion(rule: str, relation: Relation) -> Criterion:
     return Criterion("pulsation", "slip_amplitude", onset, relation=relation, by=by)
 
 
-def _ramp_end(m: Measurement) -> float:
+def _ramp_end(m: Measurement) -> Estimate:
     """The flow at which a ramp ends slipping by theory; LookupError if it doesn't."""
     p, rate = m.parameters, m.at("rate")
     # The ramp goes on three times as far beyond the fold as a slow one overshoots it.
@@ -45,7 +50,7 @@ def _ramp_end(m: Measurement) -> float:
     end = caught_up(simulated(p, state(m), t_end, 5_000, Flow.ramp(p.omega_0, beyond, t_end)))
     if math.isnan(end):
         raise LookupError("in theory the ramp doesn't end slipping")
-    return end
+    return integrated(end, end)
 
 
 def _lowest_flow(m: Measurement) -> float:
@@ -58,9 +63,10 @@ _BOTH, _ONE = "at both points", "at one point"
 _MEAN = f"{_BY}.pulsation.mean_error"
 
 
-def _mean_error(m: Measurement) -> float:
+def _mean_error(m: Measurement) -> Estimate:
     """The mean of omega_c in a pulsation less that of the flow, rad s-1."""
-    return theory(pulsation.mean_error, m.parameters, m.at("amplitude"), m.at("f"))
+    value = theory(pulsation.mean_error, m.parameters, m.at("amplitude"), m.at("f"))
+    return Estimate(value, pulsation.SETTLED * abs(m.parameters.omega_0))
 
 
 def _flow(m: Measurement) -> float:
@@ -78,10 +84,10 @@ CLAIMS = (
         Criterion(
             "pulsation",
             "gain",
-            lambda m: abs(_gain(m)),
+            lambda m: _followed(m)[0],
             by=f"{_BY}.response.transfer, pulsation.first_harmonic",
         ),
-        Criterion("pulsation", "phase_lag", lambda m: -cmath.phase(_gain(m)), by="the same"),
+        Criterion("pulsation", "phase_lag", lambda m: _followed(m)[1], by="the same"),
         Criterion(
             "unsteady", "jump_delay", lambda m: 1 / response.rolling_rate(m.parameters), by=_RATE
         ),
@@ -189,7 +195,7 @@ CLAIMS = (
             "unsteady",
             "ramp_end",
             _ramp_end,
-            size=lambda m: abs(_ramp_end(m) - analytic.thresholds(m.parameters).omega_04),
+            size=lambda m: abs(_ramp_end(m).value - analytic.thresholds(m.parameters).omega_04),
             by="analytic.simulate",
         ),
     ),

@@ -22,6 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from numpy.polynomial import Polynomial
 
 from compare.kit.brackets import Attempt, Bracket, Search, narrow
 from compare.kit.programme import Protocol
@@ -39,7 +40,7 @@ from compare.kit.record import (
 )
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.settling import rounded_duration, settle
-from compare.kit.statistics import COVERAGE, Estimate, estimate, peaks, top
+from compare.kit.statistics import COVERAGE, Estimate, estimate, peaks, top, uniform
 from compare.kit.step_pairs import Start, StepPair, carry_out, of_no_step
 from compare.kit.tasks import Task
 from model import Case, Contact, Flow, Parameters, State, Trajectory
@@ -487,17 +488,25 @@ def _jump_quantities(up: Trajectory, down: Trajectory) -> dict[str, Estimate]:
     t, y = up.time, odd_part(up, down)
     # Forces act in the middle of a step: times are known to half a finer step.
     late = coarse_step(up.header.parameters) / 4 / math.sqrt(12)
+    at, height = _highest(t, y)
+    _, seldom = _highest(t[::2], y[::2])
+    return {
+        "jump_delay": estimate(float(np.trapezoid(1 - y, t)), sampling=late),
+        "jump_peak": estimate(at, sampling=late),
+        # What is left of the size of a jump is of its second order.
+        "jump_height": estimate(height, sampling=uniform(abs(seldom - height)), jump=JUMP**2),
+    }
+
+
+def _highest(t: Array, y: Array) -> tuple[float, float]:
+    """Time and height of the highest peak of samples (n,) in their first half; nan without one."""
     k, later = peaks(y)
     highest = (k == y.argmax()) & (k < len(t) // 2)
     at, height = (
         np.append(each[highest], math.nan)[0]
         for each in (t[k] + later * (t[1] - t[0]), top(y, k, later))
     )
-    return {
-        "jump_delay": estimate(float(np.trapezoid(1 - y, t)), sampling=late),
-        "jump_peak": estimate(at, sampling=late),
-        "jump_height": estimate(height),
-    }
+    return float(at), float(height)
 
 
 def caught_up(run: Trajectory) -> float:
@@ -506,8 +515,9 @@ def caught_up(run: Trajectory) -> float:
     below = np.flatnonzero(lag < lag[0] / 2)
     if not len(below):
         return math.nan
-    near = slice(below[0], below[0] - 2, -1)
-    return float(run.header.flow(np.interp(lag[0] / 2, lag[near], run.time[near])))
+    near = slice(below[0] - 2, below[0] + 2)
+    time = Polynomial.fit(lag[near], run.time[near], 3)(lag[0] / 2)
+    return float(run.header.flow(time))
 
 
 PROTOCOLS = (
