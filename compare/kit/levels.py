@@ -72,7 +72,7 @@ class Sampling:
     thresholds_width: float = 5e-5  # relative width of the last brackets
     thresholds_fold: float = 6e-4  # and of those about a fold
     thresholds_loose: float = 10.0  # factor on the settling tolerance
-    thresholds_rounds: tuple[float, ...] = (1.0, 1.0, 2.0, 2.0)
+    thresholds_rounds: tuple[float, ...] = ()  # as settling_rounds; none: those
 
     edge_flows: Flows = (0.3,)  # parts of the way from omega_02 to omega_04
     edge_lines: int = 3  # for each edge
