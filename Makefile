@@ -16,6 +16,8 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 RESULTS ?= results
+# Bytecode is kept: else each process compiles all that it imports, for seconds, and checks start hundreds of them.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: help validate mutants blind verdicts measured trial league test test-all benchmarks docs wheel check ready tried lint lock clean
 
