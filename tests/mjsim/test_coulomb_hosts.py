@@ -1,11 +1,12 @@
 """Coulomb's law can't hurt the program that it is in, whatever that does: MuJoCo's own errors, or
 one line.
 
-What may end a process is tried in one of its own: its function is below, without `test_`, and
-what it prints last is its answer."""
+What may end a process is tried in another one: its function is below, without `test_`, and what
+it prints is its answer. One process answers all, and where it ends another one goes on."""
 
 import contextlib
 import copy
+import faulthandler
 import functools
 import gc
 import json
@@ -53,24 +54,51 @@ def scene(option="", actuator="", more=""):
     return model, mujoco.MjData(model)
 
 
-@pytest.fixture
-def alone(tmp_path):
-    """Call a function of this file in a process of its own, once with each of what is given.
+class Other:
+    """Another process, which calls functions of this file; once it has ended, a new one."""
+
+    END, PATIENCE = "that is all", 600.0
+    """What it prints last, and after how many seconds it gives up: compiling, too, takes time."""
+
+    def __init__(self, where):
+        self.where, self.process = where, None
+
+    def __call__(self, function, *calls):
+        """What a function prints that is called once with each of what is given."""
+        with (self.where / "errors").open("a+") as errors:
+            self.process = self.process or subprocess.Popen(
+                [sys.executable, "-X", "faulthandler", __file__],
+                cwd=self.where,  # where MuJoCo logs
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=errors,
+                text=True,
+            )
+            print(json.dumps([function.__name__, calls]), file=self.process.stdin, flush=True)
+            lines = []
+            for line in self.process.stdout:
+                if line.rstrip() == self.END:
+                    return lines
+                lines.append(line.rstrip())
+            errors.seek(0)
+            pytest.fail(f"exit code {self.end()}\n{errors.read()[-3000:]}")
+
+    def end(self):
+        process, self.process = self.process, None
+        with process:  # which closes its input
+            pass
+        return process.returncode
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory):
+    """Call a function of this file in another process, once with each of what is given.
 
     Returns what it prints."""
-
-    def run(function, *calls):
-        done = subprocess.run(
-            [sys.executable, "-X", "faulthandler", __file__, function.__name__, json.dumps(calls)],
-            cwd=tmp_path,  # where MuJoCo logs
-            capture_output=True,
-            text=True,
-            timeout=600,  # of compiling, too
-        )
-        assert done.returncode == 0, f"exit code {done.returncode}\n{done.stderr[-3000:]}"
-        return done.stdout.splitlines()
-
-    return run
+    other = Other(tmp_path_factory.mktemp("other"))
+    yield other
+    if other.process:
+        other.end()
 
 
 # -- copies ----------------------------------------------------------------------------------------
@@ -126,14 +154,9 @@ def copied_after_installed(rigid):
 
 def unpickled(path):
     """Another process goes on from a pickle as this one does."""
-    print(pickle.loads(Path(path).read_bytes()).step(60).tobytes().hex())
-
-
-def pickled(rigid, path):
-    environment = Environment(rigid)
-    environment.step(100)
-    Path(path).write_bytes(pickle.dumps(environment))
-    print(environment.step(60).tobytes().hex())
+    law, data = pickle.loads(Path(path).read_bytes())
+    law.step(data, 60)
+    print(data.qpos.tobytes().hex())
 
 
 def copies(rigid):
@@ -145,10 +168,12 @@ def test_copies(alone):
     assert alone(copies, *BOTH) == ["equal"] * 4
 
 
-def test_pickles_in_another_process(alone, tmp_path):
-    soft, rigid = str(tmp_path / "soft"), str(tmp_path / "rigid")
-    expected = alone(pickled, [False, soft], [True, rigid])
-    assert alone(unpickled, [soft], [rigid]) == expected
+@WAYS
+def test_pickles_in_another_process(alone, tmp_path, rigid):
+    here, path = Environment(rigid), tmp_path / "kept"
+    here.step(100)
+    path.write_bytes(pickle.dumps((here.law, here.data)))
+    assert alone(unpickled, [str(path)]) == [here.step(60).tobytes().hex()]
 
 
 # -- errors ----------------------------------------------------------------------------------------
@@ -685,5 +710,10 @@ def test_random_models_end_nothing(alone, seeds):
 
 if __name__ == "__main__":
     sys.path[0] = str(ROOT)
-    for call in json.loads(sys.argv[2]):
-        globals()[sys.argv[1]](*call)
+    for asked in sys.stdin:
+        name, calls = json.loads(asked)
+        faulthandler.dump_traceback_later(Other.PATIENCE, exit=True)
+        for call in calls:
+            globals()[name](*call)
+        faulthandler.cancel_dump_traceback_later()
+        print(Other.END, flush=True)
