@@ -154,13 +154,6 @@ def at_home(here, capsys):
     return run
 
 
-def test_the_first_lines_of_the_cheat_sheet_run(at_home, capsys):
-    first = next(block for block in blocks(DOCS / "cheat-sheet.md") if block.language == "sh")
-    for line in first.text.splitlines():
-        _, *words = shlex.split(line, comments=True)
-        assert carried_out(capsys, *words)[0] == 0, line
-
-
 def test_cells_of_pages_hide_no_mistake(capsys):
     cells.shell("exit 1")
     with pytest.raises(RuntimeError, match="exit code 2"):

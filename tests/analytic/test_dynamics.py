@@ -120,14 +120,16 @@ def test_rolling_at_both_points_symbolically():
         assert sp.simplify(mine - solution.get(name, name)) == 0, str(name)
 
 
-@pytest.mark.parametrize(
-    ("mu", "eta", "omega_0"), [(0.3, 0.45, 17.0), (0.01, 0.9, 17.0), (0.9, 0.01, -17.0)]
-)
-@pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("case", [case for case in Case if case is not Case.RR])
-def test_rates_and_forces_at_random_states(case, law, mu, eta, omega_0):
-    """Off the wall, too. Errors are measured against the sum of all accelerations that enter, as
-    round-off is."""
+def test_rates_and_forces_at_random_states(case):
+    """Off the wall, too, by all laws of drag."""
+    contacts = (0.3, 0.45, 17.0), (0.01, 0.9, 17.0), (0.9, 0.01, -17.0)
+    off = {(law, given): furthest_off(case, law, *given) for law in LAWS for given in contacts}
+    assert not {at: error for at, error in off.items() if error > 1e-12}
+
+
+def furthest_off(case, law, mu, eta, omega_0):
+    """Errors are measured against the sum of all accelerations that enter, as round-off is."""
     x, p = random_states(case, N), P.replace(drag=law, nu_f=1e-5, mu=mu, eta=eta, omega_0=omega_0)
     _, v_y, omega_c, *slips, h, v_h = x.T
     rho, fastest = p.R - h, np.abs(slips).sum(axis=0)
@@ -145,7 +147,7 @@ def test_rates_and_forces_at_random_states(case, law, mu, eta, omega_0):
     mine = np.concatenate([vector_field(case, x, p), *contact_forces(case, x, p)], axis=1)
     scale = np.array([1, 1, 1 / (p.R / 10), *[1 / p.r / p.j] * 3, 1, 1, *[p.m] * 6]) * load
     scale[:, [0, 6]] += np.abs(x[:, [1, 7]])
-    assert np.max(np.abs(mine - expected) / scale) <= 1e-12
+    return np.max(np.abs(mine - expected) / scale)
 
 
 @pytest.mark.parametrize("case", list(Case))

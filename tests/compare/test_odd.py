@@ -282,7 +282,7 @@ def test_bad_inputs_drawn_from_the_parsers_are_refused(command: str, here: Path)
 @pytest.mark.filterwarnings(
     "ignore::pytest.PytestUnraisableExceptionWarning"
 )  # Ctrl-C between open() and with
-@pytest.mark.parametrize("count", [5, pytest.param(100, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [3, pytest.param(100, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("command", COMMANDS)
 def test_odd_lines(
     command: str, count: int, here: Path, stocked: Path, monkeypatch: pytest.MonkeyPatch
