@@ -26,10 +26,9 @@ EXCEPTIONS = {
     *("analytic/flowmeter/design.py:best", "mjsim/coulomb/coulomb.py:__init__"),
     # compiled by numba, which takes numbers and arrays, and formulas in the form that is compiled
     "analytic/simulation/equations.py:forces",
-    *(
-        f"analytic/simulation/solvers.py:{name}"
-        for name in ("_root", "_interpolant", "_first_fall")
-    ),
+    "analytic/simulation/solvers.py:_root",
+    "analytic/simulation/solvers.py:_interpolant",
+    "analytic/simulation/solvers.py:_first_fall",
     "analytic/simulation/solvers.py:explicit_steps",
     *(f"analytic/mechanics/contact_problem.py:{name}" for name in ("_implicit_step", "solve_pair")),
     "mjsim/mid_step.py:mid_step_forces",
@@ -42,35 +41,12 @@ EXCEPTIONS = {
 }
 SAME = {
     # what every subject, file format, adapter or page has
-    *(
-        "CAPTION",
-        "CLAIMS",
-        "DEFAULTS",
-        "FIGURES",
-        "PROTOCOL",
-        "PROTOCOLS",
-        "SCHEMA",
-        "SCHEMA_VERSION",
-        "SECTIONS",
-    ),
-    *("Scene", "Settings", "best", "defaults", "free"),
+    *"CAPTION CLAIMS DEFAULTS FIGURES PROTOCOL PROTOCOLS SCHEMA SCHEMA_VERSION SECTIONS".split(),
+    *"Scene Settings best defaults free".split(),
     # the same, with another value: degrees of polynomials, records, random numbers, units and
     # symbols of other names
-    *(
-        "DEGREES",
-        "EPS",
-        "FEWEST",
-        "G",
-        "LEAST",
-        "LISTED",
-        "PATIENCE",
-        "PUSH",
-        "REFINED",
-        "RTOL",
-        "SEED",
-        "SET",
-    ),
-    *("SKIPPED", "STARTS", "STEPS", "SYMBOLS", "T", "UNITS"),
+    *"DEGREES EPS FEWEST G LEAST LISTED PATIENCE PUSH REFINED RTOL SEED SET SKIPPED STARTS".split(),
+    *"STEPS SYMBOLS T UNITS".split(),
 }
 """Names of which a package may have several."""
 
