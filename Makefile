@@ -19,7 +19,7 @@ RESULTS ?= results
 # Bytecode is kept: else each process compiles all that it imports, for seconds, and checks start hundreds of them.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help validate mutants blind verdicts measured trial league test test-all benchmarks docs wheel check ready tried lint lock clean
+.PHONY: help validate mutants blind verdicts measured trial league test test-all benchmarks docs wheel check settled tried lint lock clean
 
 validate: $(VENV)/installed
 	$(BIN)/dualball validate --quick
@@ -67,12 +67,11 @@ wheel:
 	.ci/wheel $(PYTHON)
 
 check:
-	$(MAKE) -j 2 wheel ready
-	$(MAKE) measured  # with a process for each processor; compiles what the others then load
+	$(MAKE) -j 2 wheel settled
 	$(MAKE) -j 2 docs tried
 
-ready:
-	$(MAKE) -j 1 $(VENV)/installed-dev $(VENV)/installed-engines lint
+settled:  # measuring has a process for each processor, and compiles what the others then load
+	$(MAKE) -j 1 $(VENV)/installed-dev $(VENV)/installed-engines lint measured
 
 tried:
 	$(MAKE) -j 1 league trial test
