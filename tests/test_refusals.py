@@ -15,6 +15,7 @@ from analytic.flowmeter import response
 from analytic.slipping import slip_bounds, slip_stability
 from analytic.stationary.slipping_branch import hopf_places
 from mjsim import ContactSettings, RigidContacts
+from mjsim import simulate_many as many
 from model import Case, Flow, InputError, Parameters, State
 from model.drag import LAWS
 from model.kinematics import full_state
@@ -22,6 +23,7 @@ from model.kinematics import full_state
 P, AT_REST, WORDS = Parameters.named("reference"), [0] * 6, {"mu": 0.2}
 ROUGH, LEANS = P.replace(eta=0.6), Parameters.named("high-wall-friction")
 SLOW, FAST = P.replace(omega_0=9.0), P.replace(omega_0=35.0)
+BLUNT, BAD = P.replace(nu_f=5e-5, drag=LAWS[1]), (0, 5000, 1.5, math.nan)
 TOO_FAST = "omega_c = 20 rad s-1 cannot be rolled at both points: it takes .* is 1"
 EVERY, NU_F = (
     "every run needs parameters, a start and a flow",
@@ -45,48 +47,27 @@ TAKE_A_SET = (
     lambda p: analytic.vector_field("RR", State(), p),
     lambda p: analytic.simulate(p, AT_REST, 1.0),
     lambda p: mjsim.simulate(p, AT_REST, 1.0),
-    lambda p: mjsim.simulate_many([p], [AT_REST], 1.0),
+    lambda p: many([p], [AT_REST], 1.0),
 )
 REFUSED = [
     # of another type
     *((lambda f=f: f(WORDS), "^p must be Parameters, not dict$") for f in TAKE_A_SET),
     (lambda: analytic.simulate(P, "rest", 1.0), "^a state must be numbers, not 'rest'$"),
     (lambda: analytic.simulate(P, AT_REST, 1.0, 25.0), "^flow must be Flow, not float$"),
-    (
-        lambda: analytic.simulate(P, AT_REST, 1.0, settings="fast"),
-        "^settings must be Settings, not str$",
-    ),
-    (
-        lambda: analytic.simulate_many([P, WORDS], AT_REST, 1.0),
-        "^parameters must be Parameters, not dict$",
-    ),
-    (lambda: analytic.simulate_many(P, AT_REST, 1.0, [25.0]), "^flow must be Flow, not float$"),
+    (lambda: runs(settings="fast"), "^settings must be Settings, not str$"),
+    (lambda: simulate_many([P, WORDS], AT_REST, 1.0), "^parameters must be Parameters, not dict$"),
+    (lambda: simulate_many(P, AT_REST, 1.0, [25.0]), "^flow must be Flow, not float$"),
     (lambda: analytic.attractors(P, "many"), "^a state must be numbers, not 'many'$"),
     (lambda: mjsim.simulate(P, "rest", 1.0), "^a state must be numbers, not 'rest'$"),
     (lambda: mjsim.simulate(P, AT_REST, 1.0, 25.0), "^flow must be Flow, not float$"),
-    (
-        lambda: mjsim.simulate(P, AT_REST, 1.0, settings=""),
-        "^settings must be RigidContacts or ContactSettings, not str$",
-    ),
-    (
-        lambda: mjsim.simulate_many(P, [AT_REST], 1.0),
-        "^parameters must be Sequence, not Parameters$",
-    ),
-    (lambda: mjsim.simulate_many([P], [AT_REST], 1.0, [0.0]), "^flow must be Flow, not float$"),
-    (
-        lambda: compare.validate("nowhere", sets={"mine": WORDS}),
-        "^sets must be Parameters, not dict$",
-    ),
-    (
-        lambda: Flow.steady("fast"),
-        "^omega_0 of flow sample 0 = 'fast' must be a number in rad s-1$",
-    ),
+    (lambda: moves(settings=""), "^settings must be RigidContacts or ContactSettings, not str$"),
+    (lambda: many(P, [AT_REST], 1.0), "^parameters must be Sequence, not Parameters$"),
+    (lambda: many([P], [AT_REST], 1.0, [0.0]), "^flow must be Flow, not float$"),
+    (lambda: compare.validate("no", sets={"mine": WORDS}), "^sets must be Parameters, not dict$"),
+    (lambda: Flow.steady("fast"), "^omega_0 of flow sample 0 = 'fast' must be a number in rad s-1"),
     # out of range: model
     *((lambda law=law: P.replace(drag=law), f"^drag = '{law}' {NU_F}") for law in LAWS[1:]),
-    (
-        lambda: P.replace(drag="quadratics"),
-        r"^drag = 'quadratics' must be one of .* \(did you mean 'quadratic'\?\)$",
-    ),
+    (lambda: P.replace(drag="quadratics"), r"^drag = .* one of .* \(did you mean 'quadratic'\?\)$"),
     (lambda: P.replace(density_ratio=1.5), r"^density_ratio = 1\.5 .* floats"),
     (lambda: P.replace(omega0=3.0), "did you mean 'omega_0'"),
     (lambda: Parameters.named("referense"), "did you mean 'reference'"),
@@ -107,65 +88,40 @@ REFUSED = [
     (lambda: Flow.from_mapping({"kind": "steady"}), "not a flow"),
     (lambda: Flow.from_mapping(Flow.steady(1.0).to_mapping() | {"waves": [1]}), "not a flow"),
     # analytic
-    *(
-        (lambda n=n: number_of_folds(P.replace(**{n: 0.0})), "SS has a branch from RR")
-        for n in ("eta", "mu", "c")
-    ),
+    (lambda: number_of_folds(P.replace(eta=0.0)), "SS has a branch from RR"),
+    (lambda: number_of_folds(P.replace(mu=0.0)), "SS has a branch from RR"),
+    (lambda: number_of_folds(P.replace(c=0.0)), "SS has a branch from RR"),
     (lambda: number_of_folds(ROUGH), "SS has a branch from RR to SR for"),
     (lambda: hopf_places(ROUGH), r"eta = 0\.6 is out of range: SS has no whole branch"),
     (lambda: mean_slope(LEANS), r"eta = 0\.6 is out of range"),
-    (
-        lambda: solution(SLOW, Case.NR),
-        r"case NR has no stable stationary solution at omega_0 = 9 rad s-1 \(mu",
-    ),
+    (lambda: solution(SLOW, Case.NR), r"NR has no stable .* solution at omega_0 = 9 rad s-1 \(mu"),
     (lambda: solution(SLOW, Case.SS), "case SS has no stable stationary solution"),
     (lambda: solution(SLOW, Case.RR, stable=False), "case RR has no unstable stationary solution"),
     (lambda: solution(FAST, Case.NN), "case NN has no stable"),
     (lambda: leaning_modes(LEANS.replace(omega_0=0.0)), "SR has no stationary solution that leans"),
     (lambda: leaning_modes(LEANS.replace(mu=0.0)), "SR has no stationary solution that leans"),
-    (
-        lambda: characteristic_slope(FAST),
-        "several branches at omega_0 = 35 rad s-1: choose SR, SS, NR",
-    ),
-    (
-        lambda: characteristic_slope(P.replace(c=0.0)),
-        "no motion follows the flow at omega_0 = 12 rad s-1 with c = 0",
-    ),
+    (lambda: characteristic_slope(FAST), "branches at omega_0 = 35 rad s-1: choose SR, SS, NR"),
+    (lambda: characteristic_slope(P.replace(c=0.0)), "no motion follows the flow .* with c = 0"),
     (lambda: response.ramp_coefficient(P.replace(eta=0.02)), "there is no fold"),
     (lambda: response.transfer(P, Case.SS, 1.0), "case SS has no stable"),
-    (
-        lambda: response.rolling_rate(P.replace(nu_f=5e-5, drag=LAWS[1])),
-        "at one rate with Stokes' drag only",
-    ),
+    (lambda: response.rolling_rate(BLUNT), "at one rate with Stokes' drag only"),
     (
         lambda: slip_stability.gamma(Case.RR, Case.SS, [0, 0, 1.0, 1.0, 0, 0], [0, 0, 1.0], P),
         "slip_x = 1 .* must be 0",
     ),
     (lambda: slip_bounds.gamma_nr(0.0, [0.1, 0, 9.0, 0, 0, 1.0], P), "slip_z = 1"),
-    (
-        lambda: slip_bounds.filippov_share(Case.SS, 9.0, P),
-        "RR divides the states of RS and SR only",
-    ),
+    (lambda: slip_bounds.filippov_share(Case.SS, 9.0, P), "divides the states of RS and SR only"),
     (lambda: analytic.contact_forces(Case.RR, [0, 0, 20.0, 0, 0, 0], P, 20.0), TOO_FAST),
-    (
-        lambda: analytic.vector_field(Case.RR, AT_REST, P, math.nan),
-        "omega_0 = nan rad s-1 must be finite",
-    ),
+    (lambda: analytic.vector_field(Case.RR, AT_REST, P, math.nan), "omega_0 = nan rad s-1 must be"),
     (lambda: runs(x0=[-1e-3, 0, 0, 0, 0, 0]), "y = -0.001 m .* above the floor it must be >= 0"),
-    (
-        lambda: runs(x0=[*AT_REST, -1e-3, 0]),
-        "h = -0.001 m .* between wall and axis it must be >= 0 and < 0.05",
-    ),
+    (lambda: runs(x0=[*AT_REST, -1e-3, 0]), "h = -0.001 m .* and axis it must be >= 0 and < 0.05"),
     (lambda: runs(x0=[*AT_REST, 0, -0.2]), "v_h = -0.2 m s-1 .* wall"),
     (lambda: runs(x0=np.zeros((2, 6))), r"one state is needed, not .* \(2, "),
     (lambda: runs(t_end=0.0), "t_end = 0 s"),
     (lambda: runs(t_end=math.inf), "t_end = inf"),
     (lambda: runs(sample_interval=1e-12), "sample_interval = 1e-12 s .* samples"),
     (lambda: runs(theta_0=math.nan), "theta_0 = nan"),
-    (
-        lambda: runs(rtol=1e-16),
-        r"rtol = 1e-16 is out of range: must be >= 2\.22\d*e-14 and <= 0\.01",
-    ),
+    (lambda: runs(rtol=1e-16), r"rtol = 1e-16 .* must be >= 2\.22\d*e-14 and <= 0\.01"),
     (lambda: runs(restitution=1.5), "restitution = 1.5 .* <= 1"),
     (lambda: runs(timestep="fast"), "timestep = 'fast' must be a number"),
     (lambda: runs(method="events"), "method = 'events' .*did you mean 'event'"),
@@ -174,33 +130,22 @@ REFUSED = [
     (lambda: runs(restituton=0.5), "unknown setting 'restituton' .*did you mean 'restitution'"),
     (lambda: simulate_many([P, P], np.zeros((3, 6)), 0.1), "2 parameter sets, 3 starts"),
     (lambda: simulate_many(P, [[-0.01, 0, 0, 0, 0, 0]], 0.1), "y = -0.01 m"),
-    *(
-        (lambda n=n: simulate_many(P, AT_REST, 0.1, threads=n), f"threads = {n:g}")
-        for n in (0, 5000, 1.5)
-    ),
+    *((lambda n=n: simulate_many(P, AT_REST, 0.1, threads=n), f"threads = {n:g}") for n in BAD),
     (lambda: analytic.attractors(P, [[-1e-3, 0, 20, 0, 0, 0]]), "above the floor"),
     (lambda: analytic.attractors(P, [[0, 0, 20, 0, 0, 0, 1.0, 0]]), "h = 1 m"),
     (lambda: analytic.attractors(P, 0), "starts = 0"),
     (lambda: analytic.attractors(P, AT_REST, lasting=-1.0), "lasting = -1"),
-    (
-        lambda: analytic.attractors(P.replace(c=0.0), 1),
-        "lasting",
-    ),  # no time constant to take it from
+    # no time constant to take it from
+    (lambda: analytic.attractors(P.replace(c=0.0), 1), "lasting"),
     # mjsim
     (lambda: moves(x0=[-1, 0, 1, 0, 0, 0]), "y = -1 m is out of range"),
-    (
-        lambda: moves(x0=[0, 0, 1, 0, 0, 0, 0.06, 0]),
-        r"h = 0.06 m is out of range: .* must be .*< 0.05",
-    ),
+    (lambda: moves(x0=[0, 0, 1, 0, 0, 0, 0.06, 0]), r"h = 0.06 m .* must be .*< 0.05"),
     (lambda: moves(t_end=-1.0), "t_end = -1 s"),
     (lambda: moves(t_end=math.nan), "t_end"),
     (lambda: moves(sample_interval=1e-5), "sample_interval = 1e-05 s"),
-    *(
-        (lambda n=n: mjsim.simulate_many([P], [AT_REST], 0.1, threads=n), "^threads = ")
-        for n in (0, 1e6, math.nan, "2")
-    ),
-    (lambda: mjsim.simulate_many([P], [], 0.1), EVERY),
-    (lambda: mjsim.simulate_many([P] * 3, [AT_REST] * 3, 0.1, [Flow.steady(1.0)] * 2), EVERY),
+    *((lambda n=n: many([P], [AT_REST], 0.1, threads=n), "^threads = ") for n in (*BAD, "2")),
+    (lambda: many([P], [], 0.1), EVERY),
+    (lambda: many([P] * 3, [AT_REST] * 3, 0.1, [Flow.steady(1.0)] * 2), EVERY),
     (lambda: RigidContacts(timestep=0.0), r"timestep = 0 s is out of range: must be > 0"),
     *(
         (lambda given=given: ContactSettings(**given), says)
@@ -217,10 +162,7 @@ REFUSED = [
             ({"integrator": "RK4"}, r"integrator = 'RK4' must be one of"),
         )
     ),
-    (
-        lambda: ContactSettings.at(1e-3, solimpp=0.1),
-        "unknown contact setting 'solimpp' .did you mean 'solimp'",
-    ),
+    (lambda: ContactSettings.at(1e-3, solimpp=0.1), "unknown .* 'solimpp' .did you mean 'solimp'"),
 ]
 
 
