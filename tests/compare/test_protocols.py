@@ -79,19 +79,11 @@ def test_a_run_that_breaks_down_is_said_and_takes_no_other_with_it(runner, name,
 
     monkeypatch.setattr(Runner, "groups", breaking)
     left = Records.of(PROTOCOLS[name](runner))
-    assert ["the run diverged at once" in missing.reason for missing in left.missing].count(
-        True
-    ) == 1
-    assert sum(missing.rows for missing in left.missing if "at once" in missing.reason) < len(
-        left.measurements
-    )
+    (lost,) = [each for each in left.missing if "the run diverged at once" in each.reason]
+    assert lost.rows < len(left.measurements)
     if name == "pulsation":
-        assert {m.quantity for m in left.measurements} == {
-            "gain",
-            "phase_lag",
-            "slip_amplitude",
-            "mean_error",
-        }
+        quantities = {m.quantity for m in left.measurements}
+        assert quantities == {"gain", "phase_lag", "slip_amplitude", "mean_error"}
 
 
 @pytest.mark.parametrize(
@@ -99,22 +91,10 @@ def test_a_run_that_breaks_down_is_said_and_takes_no_other_with_it(runner, name,
     [
         (slipping.measure, P.replace(eta=0.0), slipping.FRICTIONLESS),
         (slipping.bounds, P.replace(eta=0.0), slipping.FRICTIONLESS),
-        (
-            unsteady.pulsation,
-            ROUGH,
-            "no flow was measured at which two-point rolling ends by slipping",
-        ),
-        (
-            unsteady.jumps,
-            ROUGH,
-            "no flows were measured between which the ball slips at both points",
-        ),
+        (unsteady.pulsation, ROUGH, "no flow was measured at which two-point rolling ends by slip"),
+        (unsteady.jumps, ROUGH, "no flows were measured between which the ball slips at both"),
         (thresholds.measure, P, "ends two-point rolling"),
-        (
-            flowmeter.hysteresis,
-            THICK,
-            "no flow at which slipping on the floor gives way to riding the wall",
-        ),
+        (flowmeter.hysteresis, THICK, "no flow at which slipping on the floor gives way to riding"),
     ],
 )
 def test_what_is_not_there_is_said(runner, measure, p, said):
@@ -411,25 +391,17 @@ def test_a_prediction_is_no_surer_than_its_computation(monkeypatch):
 
 def test_numbers_that_no_quick_set_has_are_judged_too():
     strong, smooth = P.replace(c=20 * P.c), P.replace(eta=0.99 * P.j)
-    born, end = (
-        analytic.bifurcation.diagram.critical_drag(strong),
-        analytic.thresholds(smooth).omega_01,
-    )
-    unknown = measured(
-        "slope", "slope", 1.0, 1e-6, P.replace(omega_0=24.0), by="neighbours", case="NR"
+    end, at = analytic.thresholds(smooth).omega_01, {"by": "neighbours", "case": "NR"}
+    unknown = measured("slope", "slope", 1.0, 1e-6, P.replace(omega_0=24.0), **at)
+    # The drag at which a fold is born, of a set whose own is too strong for one.
+    born = analytic.bifurcation.diagram.critical_drag(strong)
+    right, wrong = (
+        measured("birth", "critical_drag", factor * born, 1e-4 * born, strong)
+        for factor in (1.0, 1.01)
     )
     for claim, row, outcome in (
-        # The drag at which a fold is born, of a set whose own is too strong for one.
-        (
-            "double-points",
-            measured("birth", "critical_drag", born, 1e-4 * born, strong),
-            Outcome.CONFIRMED,
-        ),
-        (
-            "double-points",
-            measured("birth", "critical_drag", 1.01 * born, 1e-4 * born, strong),
-            Outcome.REFUTED,
-        ),
+        ("double-points", right, Outcome.CONFIRMED),
+        ("double-points", wrong, Outcome.REFUTED),
         ("slope-rolling", unknown, Outcome.REFUTED),
         # A range that another threshold may end is not held against the tolerances of this one.
         ("design-limit", measured("thresholds", "omega_01", end, 1e-9, smooth), Outcome.CONFIRMED),
@@ -515,23 +487,12 @@ def test_an_end_that_cannot_be_extrapolated_is_missing_and_no_finding(runner, mo
         floor = next(case for case in (Case.RR, Case.SS, Case.NR) if case in cases)
         wall = Case.NR if Case.NR in cases else Case.NS
         for start, case in (("rest", floor), ("with the fluid", floor), ("on the wall", wall)):
-            rows.append(
-                measured(
-                    "settled",
-                    "case",
-                    float(case),
-                    0.0,
-                    q,
-                    "thick-fluid",
-                    start=start,
-                    case=case.name,
-                )
-            )
+            at = {"start": start, "case": case.name}
+            rows.append(measured("settled", "case", float(case), 0.0, q, "thick-fluid", **at))
     records = Records.of(thresholds.measure(runner, {"thick-fluid": p}, Records(tuple(rows))))
     assert any("points to no flow at which it ends" in each.reason for each in records.missing)
-    assert [m.value for m in records.select("thresholds", "folds")] == [
-        1.0
-    ]  # an end is seen, and no smooth one
+    # An end is seen, and no smooth one.
+    assert [m.value for m in records.select("thresholds", "folds")] == [1.0]
 
 
 def run_of(time, y, theta):

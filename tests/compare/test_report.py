@@ -67,30 +67,21 @@ def checks(count: int, deviation: float = 0.0, tolerance: float = 3e-9) -> tuple
     )
 
 
+def verdict(claim, outcome, checks=(), **others):
+    return Verdict(claim=claim, outcome=outcome, checks=checks, **others)
+
+
+LOST = {
+    "error": "ValueError: diverged & <so> on",
+    "missing": (Missing("thresholds", "rough-wall", "no flow <at which> it slips"),),
+}
 VERDICTS = (
-    Verdict(claim=claim("good"), outcome=Outcome.CONFIRMED, checks=checks(report.ROWS + 40)),
-    Verdict(
-        claim=claim("bad", text=Text.CORRECTED, reason="A sign."),
-        outcome=Outcome.REFUTED,
-        checks=checks(3, 1e-3),
-    ),
-    Verdict(
-        claim=claim("coarse", section="Stability"),
-        outcome=Outcome.INCONCLUSIVE,
-        checks=checks(2, 0.0, 1.0),
-    ),
-    Verdict(
-        claim=claim("broken", section="Stability"),
-        outcome=Outcome.ERROR,
-        error="ValueError: diverged & <so> on",
-        missing=(Missing("thresholds", "rough-wall", "no flow <at which> it slips"),),
-    ),
-    Verdict(
-        claim=claim("doubted", expected=Outcome.REFUTED),
-        outcome=Outcome.REFUTED,
-        checks=checks(2, 1e-3),
-    ),
-    Verdict(claim=claim("deeper", section="Laws and cases"), outcome=Outcome.NOT_RUN),
+    verdict(claim("good"), Outcome.CONFIRMED, checks(report.ROWS + 40)),
+    verdict(claim("bad", text=Text.CORRECTED, reason="A sign."), Outcome.REFUTED, checks(3, 1e-3)),
+    verdict(claim("coarse", section="Stability"), Outcome.INCONCLUSIVE, checks(2, 0.0, 1.0)),
+    verdict(claim("broken", section="Stability"), Outcome.ERROR, **LOST),
+    verdict(claim("doubted", expected=Outcome.REFUTED), Outcome.REFUTED, checks(2, 1e-3)),
+    verdict(claim("deeper", section="Laws and cases"), Outcome.NOT_RUN),
 )
 RAN = [verdict for verdict in VERDICTS if verdict.outcome is not Outcome.NOT_RUN]
 
@@ -111,20 +102,13 @@ def row(text: str, name: str) -> str:
 @pytest.mark.parametrize(
     ("where", "said"),
     [
-        (
-            "",
-            "2 of 5 claims did not come out as expected: bad, broken; 1 of 5 claims can&#39;t be "
-            "told",
-        ),
+        ("", "2 of 5 claims did not come out as expected: bad, broken; 1 of 5 claims can&#39;t be"),
         ("", "Not drawn: The user&#39;s own: it was not measured"),
         ("", r"Not part of this run: <code[^>]*>deeper</code>"),
         ("good", "What good states of slip &amp; &lt;roll&gt;."),
         ("", "Out of sight, so that an error of theory there would go unnoticed"),
         ("good", "dualball validate --claim good --quick -o"),
-        (
-            "good",
-            r'title="time step 64 %, solver 36 %">1.0e-09<br><span class="soft">time step 64 %<',
-        ),
+        ("good", r'title="time step 64 %, solver 36 %">1.0e-09<br><span class="soft">time step 64'),
         ("bad", "Prop. bad, corrected. A sign."),
         ("bad", "Expected: confirmed."),
         ("broken", "ValueError: diverged &amp; &lt;so&gt; on"),
@@ -183,11 +167,8 @@ def test_the_first_screen_answers_what_engines_get_right():
         return EngineVerdict(engine=engine, outcome=outcome, deviations=(0.01,))
 
     right, wrong = (
-        dataclasses.replace(RAN[0], claim=claim(name), engines=beside)
-        for name, beside in (
-            ("good", (by("mujoco-plain", Outcome.CONFIRMED),)),
-            ("bad", (by("mujoco-plain", Outcome.REFUTED),)),
-        )
+        dataclasses.replace(RAN[0], claim=claim(name), engines=(by("mujoco-plain", outcome),))
+        for name, outcome in (("good", Outcome.CONFIRMED), ("bad", Outcome.REFUTED))
     )
     first = wording.answers([right, wrong])[0]
     assert first["question"] == wording.QUESTIONS["mujoco-plain"]
@@ -200,55 +181,42 @@ def test_the_first_screen_answers_what_engines_get_right():
 
 
 def test_verdicts_are_said_alike_in_the_terminal_on_the_page_and_in_the_summary(page):
-    text, summary = (
-        html.unescape(page.read_text("utf-8")),
-        validate.summary(VERDICTS, Path("report.html")).plain,
-    )
+    text = html.unescape(page.read_text("utf-8"))
+    summary = validate.summary(VERDICTS, Path("report.html")).plain
     for verdict in RAN:
         for heading, found in wording.findings(verdict).items():
             assert f"{heading.lower()} {found}" in validate.detail(verdict).plain
             assert f"<dt>{heading}</dt>" in row(text, verdict.claim.id)
             assert html.unescape(typeset(found)) in row(text, verdict.claim.id)
-    for said in (
-        wording.headline(RAN),
-        wording.coarse_and_missing(RAN),
-        *map(" ".join, wording.totals(RAN)),
-    ):
+    totals = map(" ".join, wording.totals(RAN))
+    for said in (wording.headline(RAN), wording.coarse_and_missing(RAN), *totals):
         assert said in summary
         assert said in re.sub("</?b>", " ", text)
     m = dataclasses.replace(checks(1)[0].measurement, quantity="case")
-    for predicted, said in (
-        (12.0, "none: all equal"),
-        (1.0, "not equal: case, reference"),
-    ):  # counts have no tolerance
+    # Counts have no tolerance.
+    for predicted, said in ((12.0, "none: all equal"), (1.0, "not equal: case, reference")):
         check = Check(measurement=m, predicted=predicted, tolerance=0.0, scale=1.0)
-        assert wording.findings(dataclasses.replace(RAN[0], checks=(check,))) == {
-            "Largest deviation": said
-        }
+        found = wording.findings(dataclasses.replace(RAN[0], checks=(check,)))
+        assert found == {"Largest deviation": said}
     bad = results.load(page.parent).verdicts["bad"]
-    assert (bad["id"], bad["verdict"], bad["passed"], bad["expected"]) == (
-        "bad",
-        "refuted",
-        False,
-        "confirmed",
-    )
+    assert [bad[name] for name in ("id", "verdict", "expected")] == ["bad", "refuted", "confirmed"]
+    assert not bad["passed"]
     assert (bad["checks"], bad["agrees"]) == (len(VERDICTS[1].checks), 0)
     assert results.described(VERDICTS[1])["checks"][0]["conditions"]["y"] == 0.02
 
 
 def test_a_figure_of_several_claims_is_drawn_once_or_is_a_gap(tmp_path, monkeypatch):
+    fall, lost = lambda _: (Figure(figsize=(1, 1)), ""), GapError("the run <is> lost")
     figures = {
-        "fall": Drawing(
-            "A fall", lambda _: None, lambda _: (Figure(figsize=(1, 1)), ""), ("good", "bad")
-        ),
-        "gap": Drawing(
-            "A gap", lambda _: None, mock.Mock(side_effect=GapError("the run <is> lost")), ("good",)
-        ),
+        "fall": Drawing("A fall", lambda _: None, fall, ("good", "bad")),
+        "gap": Drawing("A gap", lambda _: None, mock.Mock(side_effect=lost), ("good",)),
     }
+
+    def figures_of(claim):
+        return {name: each for name, each in figures.items() if claim in each.claims}
+
     monkeypatch.setattr(report, "FIGURES", {})
-    monkeypatch.setattr(
-        report, "figures_of", lambda claim: {n: f for n, f in figures.items() if claim in f.claims}
-    )
+    monkeypatch.setattr(report, "figures_of", figures_of)
     page = report.write(Evidence(directory=tmp_path), VERDICTS[:2], Summary.of([], Level.QUICK, {}))
     text = page.read_text("utf-8")
     assert text.count('<figure class="plot"') == 1
@@ -259,11 +227,7 @@ def test_a_figure_of_several_claims_is_drawn_once_or_is_a_gap(tmp_path, monkeypa
 @pytest.mark.parametrize(
     ("part", "other", "message"),
     [
-        (
-            '"schema_version": 6',
-            '"schema_version": 4',
-            "holds no summary that this program reads: .* another format",
-        ),
+        ('version": 6', 'version": 4', "no summary that this program reads: .* another format"),
         ('"dualball": "[^"]*"', '"dualball": "0.0.0"', "holds results of dualball 0.0.0"),
     ],
 )
