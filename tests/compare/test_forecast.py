@@ -100,11 +100,8 @@ def settled(text, limit=10.0, control=None):
     data = mujoco.MjData(model)
     if model.nkey:
         mujoco.mj_resetDataKeyframe(model, data, 0)
-    return (
-        model,
-        data,
-        forecast.forecast(model, data, settle(model, data, limit, control), control=control),
-    )
+    still = settle(model, data, limit, control)
+    return model, data, forecast.forecast(model, data, still, control=control)
 
 
 @pytest.fixture
@@ -165,11 +162,8 @@ def test_contact_is_lost_from_the_predicted_speed_on(name):
     model, data, found = settled(mjcf(floor + GUIDED.format(shape), option, geom, rest))
     predicted = found.pairs[0].hover
     first, second = data.contact.frame[0].reshape(3, 3)[1:]
-    direction = (
-        (first + second) / math.sqrt(2)
-        if model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL
-        else first
-    )
+    pyramid = model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL
+    direction = (first + second) / math.sqrt(2) if pyramid else first
     for share, lost in ((0.95, False), (1.05, True)):
         for speed in np.linspace(0.1, share, 20) * predicted:
             model.geom_surfacevel[0, :3] = speed * direction
@@ -345,11 +339,8 @@ def test_advice_does_what_it_says(scene, tmp_path, monkeypatch):
         np.testing.assert_allclose(getattr(pasted, name), getattr(model, name))
     for name in [change.option] if hasattr(model.opt, change.option) else ():
         assert getattr(pasted.opt, name) == getattr(model.opt, name)
-    assert (
-        bool(found.remedy)
-        == bool(held)
-        == (max(pair.creep for pair in after.pairs) > forecast.CREEP)
-    )
+    creeps = max(pair.creep for pair in after.pairs) > forecast.CREEP
+    assert bool(found.remedy) == bool(held) == creeps
     if held:
         (tmp_path / "scene.xml").write_text((SCENES | DEEP)[scene])
         exec(dict(forecast_page.snippets(found, "scene.xml"))["Python"], names := {})
@@ -400,14 +391,11 @@ def test_the_page_the_json_and_what_the_engine_replaces(forecasts, tmp_path):
     text = SCENES["hidden mix"].replace("<option ", '<option timestep=".008" ')
     shown = forecasts(text, "--try", "--json", "-o", str(page := tmp_path / "page.html"))
     (pair,) = shown["before"]["pairs"]
-    assert shown["after"]["pairs"][0]["creep_measured"] == pytest.approx(
-        shown["before"]["change"]["after"], rel=0.2
-    )
+    creep = shown["after"]["pairs"][0]["creep_measured"]
+    assert creep == pytest.approx(shown["before"]["change"]["after"], rel=0.2)
     assert [kind.partition(" ")[0] for kind in pair["replaced"]] == ["solref", "solref", "friction"]
-    assert (
-        pair["replaced"]["solref too short for the time step"]
-        == "0.012 s: 0.016 s is taken (refsafe)"
-    )
+    short = pair["replaced"]["solref too short for the time step"]
+    assert short == "0.012 s: 0.016 s is taken (refsafe)"
     assert "To paste: MJCF" in page.read_text("utf-8")
 
 
@@ -439,13 +427,8 @@ def test_eighty_contacts_stay_readable():
     _, _, found = settled(mjcf(FLOOR.format('solref=".03 1"') + boxes), limit=2.0)
     assert sum(len(pair.members) for pair in found.pairs) == 80
     assert [len(rows) for _, rows in forecast_page.tables(found)] == [forecast.SHOWN + 1] * 2
-    assert (
-        sum(
-            "replaces solref" in line and "at 19 more" in line
-            for line in forecast_page.sentences(found)
-        )
-        == 1
-    )
+    said = [line for line in forecast_page.sentences(found) if "replaces solref" in line]
+    assert sum("at 19 more" in line for line in said) == 1
 
 
 TURNING = f'<body pos="0 0 .0499"><joint axis="0 0 1"/><geom name="box" {BLOCK} mass="1"/></body>'
@@ -521,9 +504,8 @@ def test_controls_come_by_number_name_or_keyframe_and_bad_ones_get_one_line(fore
         assert said in error
         assert error.count("\n") == 1
     words = ["--keyframe", "held", "--max-creep"]
-    assert re.search(
-        r"rod / left: creep 0.000\d+ m/s, more than 1e-06", forecasts(text, *words, "1e-6", code=1)
-    )
+    said = forecasts(text, *words, "1e-6", code=1)
+    assert re.search(r"rod / left: creep 0.000\d+ m/s, more than 1e-06", said)
     forecasts(text, *words, "1e-3", "--max-depth", "1e-3")
 
 

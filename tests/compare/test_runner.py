@@ -20,18 +20,13 @@ from model import InputError, StorageError
 from tests.commands import refused, told
 from tests.exact_cases import CASES
 
+SHAPES = "state() must return position, velocity and spin, not shapes "
 BREAKS = {
     "sphere-rolls-down": ("hangs", "took longer than 3 s at a step of 4 ms"),
     "block-rests": ("dies", "crashed (exit code 3) at a step of 4 ms"),
     "cylinder": ("raises", "ValueError: singular matrix"),
-    "sphere-slips-down": (
-        "shapes",
-        "state() must return position, velocity and spin, not shapes [(3,), (2,), (3,)]",
-    ),
-    "sphere-slides-rolls": (
-        "none",
-        "state() must return position, velocity and spin, not shapes []",
-    ),
+    "sphere-slips-down": ("shapes", f"{SHAPES}[(3,), (2,), (3,)]"),
+    "sphere-slides-rolls": ("none", f"{SHAPES}[]"),
     "box-stops": ("nan", "diverged by t = 0.04 s at a step of 4 ms"),
 }
 """How an engine breaks in a case, and what is said of it."""
@@ -78,11 +73,8 @@ EXACT, ROUGH = Exact(), Exact(PRECISION="f32")
 
 
 def test_what_breaks_loses_the_case_and_not_the_run():
-    first, *broken, last = run_all(
-        [CASES[name] for name in ("block-slides", *BREAKS, "turntable")],
-        Exact(breaks=True),
-        limit=3.0,
-    )
+    tried = [CASES[name] for name in ("block-slides", *BREAKS, "turntable")]
+    first, *broken, last = run_all(tried, Exact(breaks=True), limit=3.0)
     assert first.passed
     assert last.passed
     assert [each.failure for each in broken] == [says for _, says in BREAKS.values()]
@@ -104,15 +96,9 @@ def test_errors_order_creep_and_cost():
 @pytest.mark.parametrize(
     ("engine", "says"),
     [
-        (
-            "no.such.module",
-            "no.such.module can't be used: ModuleNotFoundError: No module named 'no'",
-        ),
+        ("no.such", "no.such can't be used: ModuleNotFoundError: No module named 'no'"),
         ("compare.bench.runner", "compare.bench.runner has no function build nor step nor state"),
-        (
-            SimpleNamespace(build=print, step=print),
-            "SimpleNamespace has no function state; an engine has build, step",
-        ),
+        (SimpleNamespace(build=print, step=print), "has no function state; an engine has build, "),
         ("compare.adapters.mujoco_free:gone", " has no attribute 'gone' (mujoco "),
         (Exact(PRECISION="f128"), "PRECISION = 'f128' must be one of f64, f32"),
     ],
@@ -164,17 +150,10 @@ def test_the_set_as_files(tmp_path, capsys):
         for case in cases():
             again = read(tmp_path / f"{case.name}.json")
             assert again.error(case.exact) == 0
-            assert (again.bodies, again.surfaces, again.needs) == (
-                case.bodies,
-                case.surfaces,
-                case.needs,
-            )
+            for part in ("bodies", "surfaces", "needs", "contacts"):
+                assert getattr(again, part) == getattr(case, part)
             assert np.array_equal(file[case.name]["exact"], case.exact)
-            assert (
-                file[case.name]["contacts"].asstr()[:].tolist()
-                == list(case.contacts)
-                == list(again.contacts)
-            )
+            assert file[case.name]["contacts"].asstr()[:].tolist() == list(case.contacts)
     assert "a hollow sphere" in told(capsys, "cases lands")
     refused(capsys, "cases land")
 
@@ -192,11 +171,7 @@ def test_a_file_of_version_1_is_read_and_what_is_none_refused(tmp_path):
     newer = f"is of version {VERSION + 1} of the exact cases; this program reads 1 to {VERSION}"
     for text, error, says in (
         (json.dumps(data | {"version": VERSION + 1}), InputError, newer),
-        (
-            json.dumps(data | {"schema": "other"}),
-            InputError,
-            "is no exact case: its schema is 'other'",
-        ),
+        (json.dumps(data | {"schema": "other"}), InputError, "its schema is 'other'"),
         *(
             (text, StorageError, "holds no exact case")
             for text in ("[]", "{}", "no", '{"schema": "dualball-case"}')
@@ -269,17 +244,8 @@ def loaded():
 def test_an_engine_on_the_exact_cases_beside_tests_of_ones_own(pytester):
     pytester.makepyfile(adapter=ADAPTER, test_mine=FIXTURES)
     known = pytester.makefile(".txt", known="# ours\ncylinder   it has no wall\nblock-rests\n")
-    given = (
-        "test_mine.py",
-        "--dualball-engine",
-        "adapter",
-        "--dualball-known",
-        str(known),
-        "-rx",
-        "-n",
-        "1",
-    )
-    found = pytester.runpytest_subprocess(*INSTALLED, *given)
+    given = f"test_mine.py --dualball-engine adapter --dualball-known {known} -rx -n 1"
+    found = pytester.runpytest_subprocess(*INSTALLED, *given.split())
     found.stdout.fnmatch_lines(
         ["*box that is pushed off*errors*allowed is 0.01*", "*exact cases:*"]
     )
@@ -289,22 +255,15 @@ def test_an_engine_on_the_exact_cases_beside_tests_of_ones_own(pytester):
     found.stdout.fnmatch_lines(["*XFAIL adapter::cylinder - it has no wall*"])
     outcomes = found.parseoutcomes()
     new = sum(bool(case.needs) for case in bench.cases())  # of which the adapter says nothing
-    assert (outcomes["failed"], outcomes["xfailed"], outcomes["xpassed"], outcomes["skipped"]) == (
-        1,
-        1,
-        1,
-        1 + new,
-    )
+    told = [outcomes[name] for name in ("failed", "xfailed", "xpassed", "skipped")]
+    assert told == [1, 1, 1, 1 + new]
     assert outcomes["passed"] == 2 * len(bench.cases()) - new - 3  # and the tests that are named
 
 
 @pytest.mark.parametrize(
     ("args", "message"),
     [
-        (
-            "--dualball-engine nosuch",
-            "*nosuch can't be used: ModuleNotFoundError: No module named 'nosuch'*",
-        ),
+        ("--dualball-engine nosuch", "*nosuch can't be used: ModuleNotFoundError: No module *"),
         ("--dualball-engine half", "*half has no function state*"),
         ("--dualball-engine half --dualball-known half.py", "*no case is called 'build'*"),
         ("--dualball-engine half --dualball-known none", "*cannot read none*"),
