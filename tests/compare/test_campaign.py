@@ -175,10 +175,8 @@ def test_runs_of_other_versions_are_left_alone(tmp_path, capsys, monkeypatch):
     with Campaign(tmp_path, workers=0) as campaign:
         campaign.label = "again"
         assert campaign.complete(tasks(2)) == []
-    assert (
-        capsys.readouterr().err
-        == f"dualball: 2 files of runs of other versions are left alone in {tmp_path}\n"
-    )
+    said = f"dualball: 2 files of runs of other versions are left alone in {tmp_path}\n"
+    assert capsys.readouterr().err == said
     assert before.items() <= {path: path.read_bytes() for path in tmp_path.iterdir()}.items()
     assert len(before) + 1 == len(list(tmp_path.iterdir()))
 
@@ -206,13 +204,10 @@ def test_a_run_that_diverges_is_reported_and_the_rest_goes_on(tmp_path):
         failures = campaign.complete([*tasks(2), WILD])
         assert [failure.task for failure in failures] == [WILD]
         assert "diverged" in failures[0].reason
-        assert sorted(path.suffixes for path in tmp_path.glob("*.h5")) == [
-            [".failed", ".h5"],
-            [".h5"],
-        ]
-        assert [entry["key"] for entry in json.loads((tmp_path / FAILURES).read_text())] == [
-            WILD.key
-        ]
+        suffixes = sorted(path.suffixes for path in tmp_path.glob("*.h5"))
+        assert suffixes == [[".failed", ".h5"], [".h5"]]
+        (entry,) = json.loads((tmp_path / FAILURES).read_text())
+        assert entry["key"] == WILD.key
         with pytest.raises(SimulationError, match="diverged"):
             campaign.run([WILD])
     with Campaign(tmp_path, workers=0) as again:  # it is not tried again, but told again
@@ -220,14 +215,9 @@ def test_a_run_that_diverges_is_reported_and_the_rest_goes_on(tmp_path):
 
 
 def test_a_run_that_takes_too_long_is_reported(tmp_path):
-    endless = Task(engine="mujoco", parameters=P, x0=REST, t_end=6000.0)
-    slow = Task(
-        engine="time-stepping",
-        parameters=endless.parameters,
-        x0=REST,
-        t_end=6000.0,
-        sample_interval=0.01,
-    )
+    long = {"parameters": P, "x0": REST, "t_end": 6000.0}
+    endless = Task(engine="mujoco", **long)
+    slow = Task(engine="time-stepping", sample_interval=0.01, **long)
     failures = completed(tmp_path, limit=2, asked=[endless, *tasks(1, t_end=0.01), slow])
     assert [failure.task for failure in failures] == [endless, slow]
     assert {failure.reason for failure in failures} == {"it took longer than 2 s"}
@@ -262,9 +252,8 @@ def square(parent, number):
 @pytest.mark.parametrize("count", [0, 1, 2])
 def test_what_a_killed_process_was_to_do_is_done_here(count):
     with processes(count) as work:
-        assert list(work.map(functools.partial(square, os.getpid()), range(8))) == [
-            k**2 for k in range(8)
-        ]
+        squares = list(work.map(functools.partial(square, os.getpid()), range(8)))
+        assert squares == [k**2 for k in range(8)]
         assert list(work.map(abs, [-1, -2])) == [1, 2]
 
 
@@ -360,10 +349,8 @@ def test_a_sweep_that_is_interrupted_or_killed_loses_nothing_that_was_done(tmp_p
     there."""
     # Runs of some tenths of a second: however late the signal comes, some of them are still to be
     # done.
-    sweep, kept = (
-        f"sweep --vary omega_0=5:10:16 --batch 2 --time 15 -o {tmp_path} --workers".split(),
-        {},
-    )
+    sweep = f"sweep --vary omega_0=5:10:16 --batch 2 --time 15 -o {tmp_path} --workers".split()
+    kept = {}
     for by in (signal.SIGINT, signal.SIGKILL):
         process = started(*sweep, 1, stderr=subprocess.STDOUT)
         while len(written(tmp_path)) == len(kept):

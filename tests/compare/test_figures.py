@@ -150,9 +150,8 @@ def test_a_fall_that_did_not_happen_is_a_gap():
 def test_claims_have_their_own_figures_or_deviations():
     assert list(figures_of("slip-NR-NS")) == ["fig-4", "fig-5", "claim-slip-NR-NS"]
     assert list(figures_of("fig-13-right")) == ["fig-13-right", "unloading"]
-    assert {name for drawing in FIGURES.values() for name in drawing.claims} <= {
-        claim.id for claim in CLAIMS
-    }
+    named = {name for drawing in FIGURES.values() for name in drawing.claims}
+    assert named <= {claim.id for claim in CLAIMS}
     pickle.dumps(FIGURES)  # other processes draw them for the report
 
 
@@ -163,11 +162,8 @@ def test_figures_are_written_and_gaps_named(tmp_path, monkeypatch):
         "fig-9": "",
         "characteristic": "not drawn: no settled states were measured with its parameter sets",
     }
-    assert sorted(path.name for path in tmp_path.iterdir()) == [
-        "captions.txt",
-        "fig-9.png",
-        "fig-9.svg",
-    ]
+    there = {path.name for path in tmp_path.iterdir()}
+    assert there == {"captions.txt", "fig-9.png", "fig-9.svg"}
     assert "Stationary solutions off the floor" in (tmp_path / "captions.txt").read_text("utf-8")
     with pytest.raises(InputError, match="bmp"):
         list(registry.write(tmp_path, registry.of_results(Evidence()), ("bmp",)))
@@ -179,25 +175,13 @@ def test_figures_are_written_and_gaps_named(tmp_path, monkeypatch):
 def test_figures_of_a_set_of_ones_own(tmp_path, capsys, monkeypatch):
     """All that theory alone can draw, by the friction of its wall, and why the others aren't
     drawn."""
-    monkeypatch.setattr(
-        "compare.kit.drawing.save", lambda figure, path: path.touch()
-    )  # takes half of the time
-    drawn = {
-        "fig-4",
-        "fig-5",
-        "fig-7",
-        "fig-8",
-        "fig-9",
-        "fig-11",
-        "fig-13-right",
-        "unloading",
-        "pulsation",
-    }
+    # Half of the time is that of writing.
+    monkeypatch.setattr("compare.kit.drawing.save", lambda figure, path: path.touch())
+    drawn = {*"fig-4 fig-5 fig-7 fig-8 fig-9 fig-11 fig-13-right unloading pulsation".split()}
     said = told(capsys, f"figures --set high-wall-friction -o {tmp_path / 'rough'}")
     assert {path.stem for path in (tmp_path / "rough").glob("*.svg")} == drawn
-    assert said.count(": not drawn: ") == len(registry.of_set(Parameters.named("reference"))) - len(
-        drawn
-    )
+    known = registry.of_set(Parameters.named("reference"))
+    assert said.count(": not drawn: ") == len(known) - len(drawn)
     Parameters.named("reference").replace(mu=0.0, eta=0.0).save(tmp_path / "slick.toml")
     said = told(capsys, f"figures --parameters {tmp_path / 'slick.toml'} -o {tmp_path / 'slick'}")
     assert said.count("has not all thresholds") >= 5
@@ -232,10 +216,7 @@ def test_functions_warn_of_a_fluid_for_which_the_model_does_not_hold():
 @pytest.mark.parametrize(
     ("draw", "said"),
     [
-        (
-            lambda p, run: plot.figure("fig-11", p),
-            "fig-11 can't be drawn of this set: it is for η > j",
-        ),
+        (lambda p, run: plot.figure("fig-11", p), "fig-11 can't be drawn .*: it is for η > j"),
         (lambda p, run: plot.motion(run, "y", "omega_c"), "different units"),
         (lambda p, run: plot.motion(run, "force_A"), "unknown quantity of a motion"),
         (lambda p, run: plot.motion(run.to_xarray().drop_dims("axis")), "makes a table of it"),

@@ -57,10 +57,8 @@ def test_a_verdict_is_computed_from_the_numbers(value, uncertainty, expected):
 
 
 def test_without_measurements_it_was_not_run_and_the_reason_is_kept():
-    why, other = (
-        Missing("settled", "mine", "nothing settles"),
-        Missing("other", "mine", "no matter"),
-    )
+    why = Missing("settled", "mine", "nothing settles")
+    other = Missing("other", "mine", "no matter")
     (verdict,) = judge([claim()], Records((), (why, other, why)))
     assert verdict.outcome is Outcome.NOT_RUN
     assert verdict.missing == (replace(why, rows=2),)
@@ -127,11 +125,8 @@ def test_most_numbers_must_be_fine_enough_to_tell():
 def test_a_state_that_theory_does_not_know_refutes_and_a_breakdown_loses_its_own_claim_only():
     claims = [claim(lambda m: {}["no such state"]), claim(lambda m: 1 / 0), claim()]
     unknown, broken, right = judge(claims, measured(P.omega_0, FINE))
-    assert [v.outcome for v in (unknown, broken, right)] == [
-        Outcome.REFUTED,
-        Outcome.ERROR,
-        Outcome.CONFIRMED,
-    ]
+    outcomes = [each.outcome for each in (unknown, broken, right)]
+    assert outcomes == [Outcome.REFUTED, Outcome.ERROR, Outcome.CONFIRMED]
     assert unknown.worst == math.inf
     assert "division by zero" in broken.error
 
@@ -180,10 +175,8 @@ def test_claims_that_are_none_are_refused():
 
 
 def test_a_set_of_ones_own_need_not_show_what_refutes_a_claim():
-    false, (row,) = (
-        replace(claim(), expected=Outcome.REFUTED),
-        measured(P.omega_0, FINE).measurements,
-    )
+    false = replace(claim(), expected=Outcome.REFUTED)
+    (row,) = measured(P.omega_0, FINE).measurements
     for name, passed in (("mine", True), ("reference", False)):
         (verdict,) = judge([false], Records((replace(row, set=name),)))
         assert (verdict.outcome, verdict.passed) == (Outcome.CONFIRMED, passed)

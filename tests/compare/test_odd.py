@@ -53,9 +53,8 @@ CUT = {"cut.h5": "run.h5", "cut.toml": "set.toml", "cut.csv": "flow.csv", "cut.x
 
 def furnish(here: Path, stocked: Path) -> None:
     """A directory of a user, with all that commands read, whole and damaged."""
-    shutil.copytree(
-        stocked, here, ignore=shutil.ignore_patterns("results")
-    )  # which would be judged for seconds
+    # Results would be judged for seconds.
+    shutil.copytree(stocked, here, ignore=shutil.ignore_patterns("results"))
     shutil.copy(here / "run.h5", here / "öl_ω.h5")
     (here / "link.h5").symlink_to("run.h5")
     (here / "hard.h5").hardlink_to(here / "run.h5")
@@ -81,11 +80,8 @@ def values(action: argparse.Action) -> tuple[Sequence[str], Sequence[str]]:
     if isinstance(action.type, options.Number):
         return USUAL, ODD
     if isinstance(action.type, options.Output):
-        return [f"{name}{action.type.suffixes[0]}" for name in ("new", "mine")], [
-            *MINE,
-            *ABSURD,
-            *NEW,
-        ]
+        right = [f"{name}{action.type.suffixes[0]}" for name in ("new", "mine")]
+        return right, [*MINE, *ABSURD, *NEW]
     if action.type is options.results:
         return ["new"], [*MINE, *ABSURD, *NEW]
     if action.type is Path or action.metavar in ("FILE", "OTHER"):
@@ -247,10 +243,8 @@ def problems(
     ):
         belongs = any(name == own or name.startswith(f"{own}/") for own in asked)
         if code == 2 or not belongs or (name in before and name not in asked):
-            wrong.append(
-                f"{name}: {before.get(name, 'nothing')} -> {after.get(name, 'nothing')}, exit code "
-                f"{code}"
-            )
+            was, is_now = (there.get(name, "nothing") for there in (before, after))
+            wrong.append(f"{name}: {was} -> {is_now}, exit code {code}")
         elif name in before and sum(os.path.normpath(word) == name for word in words) > 1:
             wrong.append(f"{name} was read and is lost")
         elif name.endswith(".part") or (
@@ -287,9 +281,8 @@ def test_bad_inputs_drawn_from_the_parsers_are_refused(command: str, here: Path)
 def test_odd_lines(
     command: str, count: int, here: Path, stocked: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(
-        "compare.validation.validate", lambda *_, **__: []
-    )  # `test_signals` ends that
+    # `test_signals` ends what this one would measure.
+    monkeypatch.setattr("compare.validation.validate", lambda *_, **__: [])
     whole, wrong = contents(here), dict[str, list[str]]()
     for words in itertools.islice(
         lines(command, np.random.default_rng(COMMANDS.index(command))), count

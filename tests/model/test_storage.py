@@ -260,45 +260,33 @@ def test_the_runs_of_a_batch_are_one_file(tmp_path):
             storage.load(path / name)
 
 
+def attribute(name, value):
+    return lambda file: file.attrs.__setitem__(name, value)
+
+
+def column(name, value):
+    return lambda file: replace(file, name, value)
+
+
 @pytest.mark.parametrize(
     ("name", "change", "says"),
     [
-        ("run.h5", lambda f: f.attrs.__setitem__("schema", "other"), "not a dualball-trajectory"),
-        (
-            "run.h5",
-            lambda f: f.attrs.__setitem__("schema_version", 99),
-            "newer dualball: its schema version is 99",
-        ),
-        ("run.h5", lambda f: f.attrs.__setitem__("schema_version", "x"), "no valid schema version"),
+        ("run.h5", attribute("schema", "other"), "not a dualball-trajectory"),
+        ("run.h5", attribute("schema_version", 99), "newer dualball: its schema version is 99"),
+        ("run.h5", attribute("schema_version", "x"), "no valid schema version"),
         ("run.h5", lambda f: f.attrs.__delitem__("engine"), "attribute 'engine' is missing"),
-        ("run.h5", lambda f: f.attrs.__setitem__("flow", "{"), "attribute 'flow' is not JSON"),
-        (
-            "run.h5",
-            lambda f: f.attrs.__setitem__("settings", "[]"),
-            "attribute 'settings' is not a table",
-        ),
-        ("run.h5", lambda f: f.attrs.__setitem__("parameters", '{"m": -1}'), "missing parameter"),
+        ("run.h5", attribute("flow", "{"), "attribute 'flow' is not JSON"),
+        ("run.h5", attribute("settings", "[]"), "attribute 'settings' is not a table"),
+        ("run.h5", attribute("parameters", '{"m": -1}'), "missing parameter"),
         ("run.h5", lambda f: f.__delitem__("omega_c"), "no dataset 'omega_c'"),
-        (
-            "run.h5",
-            lambda f: replace(f, "omega_c", h5py.SoftLink("/y")),
-            "no dataset 'omega_c' of its own",
-        ),
-        ("run.h5", lambda f: replace(f, "force_A", np.zeros(50)), "'force_A' has shape"),
-        ("run.h5", lambda f: replace(f, "y", np.zeros(49)), "differ in length"),
-        ("run.h5", lambda f: replace(f, "y", np.array([b"a"] * 50)), "'y' has type"),
-        (
-            "run.h5",
-            lambda f: replace(f, "case", np.full(50, 9, np.int8)),
-            "case that does not exist",
-        ),
-        (
-            "batch.h5/a",
-            lambda f: f.attrs.__setitem__("schema_version", 2),
-            "newer dualball: its schema version is 2",
-        ),
-        ("batch.h5/a", lambda f: replace(f, "header", ["{"] * 3), "attribute 'header' is not JSON"),
-        ("batch.h5/a", lambda f: replace(f, "samples", [50, 0]), "does not hold what it should"),
+        ("run.h5", column("omega_c", h5py.SoftLink("/y")), "no dataset 'omega_c' of its own"),
+        ("run.h5", column("force_A", np.zeros(50)), "'force_A' has shape"),
+        ("run.h5", column("y", np.zeros(49)), "differ in length"),
+        ("run.h5", column("y", np.array([b"a"] * 50)), "'y' has type"),
+        ("run.h5", column("case", np.full(50, 9, np.int8)), "case that does not exist"),
+        ("batch.h5/a", attribute("schema_version", 2), "newer dualball: its schema version is 2"),
+        ("batch.h5/a", column("header", ["{"] * 3), "attribute 'header' is not JSON"),
+        ("batch.h5/a", column("samples", [50, 0]), "does not hold what it should"),
         ("batch.h5/a", lambda f: f["case"].__setitem__((0, 0), 9), "case that does not exist"),
     ],
 )
