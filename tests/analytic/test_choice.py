@@ -57,11 +57,8 @@ def steep(p, eps):
 def random_rolling(rng):
     """Parameters and omega_c of a ball in RR: mu to 3, eta to 2, as much lag or lead as friction
     might just hold."""
-    mu, eta, j = (
-        10 ** rng.uniform(-1.5, math.log10(3)),
-        10 ** rng.uniform(-1.5, math.log10(2)),
-        rng.uniform(0.1, 0.66),
-    )
+    mu, eta = (10 ** rng.uniform(-1.5, math.log10(most)) for most in (3, 2))
+    j = rng.uniform(0.1, 0.66)
     load = 10 ** rng.uniform(-1, 1)
     omega_c = math.sqrt(load) * UNIT
     lag = (

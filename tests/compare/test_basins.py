@@ -51,12 +51,8 @@ def test_attractors_are_the_stable_solutions_that_theory_has_and_a_map_goes_on_w
     """Beyond omega_02 the ball slips on the floor or rides on the wall: both come up, by both
     engines alike."""
     assert {s.case.name for s in stable_solutions(BISTABLE)} == {"SS", "SR", "NR"}
-    given = (
-        BISTABLE,
-        {"y": 0.002},
-        (Axis("omega_c", (5.0, 25.0, 45.0)), Axis("slip_x", (-1.0, 1.0))),
-        2,
-    )
+    axes = Axis("omega_c", (5.0, 25.0, 45.0)), Axis("slip_x", (-1.0, 1.0))
+    given = BISTABLE, {"y": 0.002}, axes, 2
     seen, maps = [], []
     for _ in range(2):
         with Campaign(

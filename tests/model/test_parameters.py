@@ -38,12 +38,13 @@ valid = st.builds(
 )
 
 
+BALL = "r = 0.01\nR = 0.05\nmu = 0.2\neta = 0.2\n"
+
+
 @pytest.mark.parametrize("law", LAWS)
 def test_a_law_of_drag_beside_a_fluid(tmp_path, law):
-    (tmp_path / "p.toml").write_text(
-        f'r = 0.01\nR = 0.05\nmu = 0.2\neta = 0.2\ndrag = "{law}"\n[fluid]\nnu_f = 1e-6\nrho_f = '
-        f"1.0\nrho_b = 4.0"
-    )
+    fluid = "[fluid]\nnu_f = 1e-6\nrho_f = 1.0\nrho_b = 4.0"
+    (tmp_path / "p.toml").write_text(f'{BALL}drag = "{law}"\n{fluid}')
     p = Parameters.load(tmp_path / "p.toml")
     assert (p.drag, p.nu_f, p.density_ratio, p.C_D) == (law, 1e-6, 0.25, 0.44)
     p.save(tmp_path / "again.toml")
@@ -128,10 +129,8 @@ def test_ranges(allowed, inside, outside, words):
     for number in outside:
         with pytest.raises(InputError) as caught:
             check_number("x", number, "m", allowed, "length of the rod")
-        assert (
-            str(caught.value)
-            == f"x = {number:g} m is out of range: length of the rod must be {words}"
-        )
+        said = f"x = {number:g} m is out of range: length of the rod must be {words}"
+        assert str(caught.value) == said
         with pytest.raises(InputError, match=r"^x = .* m is out of range: must be "):
             parse_number("x", repr(number), "m", allowed)
     with pytest.raises(InputError, match=r"^x = '5 cm' must be a number in m$"):
@@ -145,25 +144,10 @@ def test_ranges(allowed, inside, outside, words):
         ("m = 0.03", "missing parameter 'r', 'R', 'j'"),
         ("m = ", "is not valid TOML"),
         ("m = 1\nmu = 0,2\n", "line 2, column 7); a number takes a point, not a comma"),
-        (
-            "r = 0.01\nR = 0.05\nmu = 0.2\neta = 0.2\nm = 1\n[fluid]\nnu_f = 1e-6\nrho_f = "
-            "1.0\nrho_b = 2.0",
-            "m follows",
-        ),
-        (
-            "r = 0.01\nR = 0.05\nmu = 0.2\neta = 0.2\n[fluid]\nnu = 1e-6",
-            "unknown fluid property 'nu'",
-        ),
-        (
-            "r = 0.01\nR = 0.05\nmu = 0.2\neta = 0.2\n[fluid]\nnu_f = 1e-6\nrho_f = 2.0\nrho_b = "
-            "1.0",
-            "floats",
-        ),
-        (
-            "r = 0.01\nR = 0.05\nmu = 0.2\neta = 0.2\n[fluid]\nnu_f = -1e-6\nrho_f = 1.0\nrho_b = "
-            "2.0",
-            "nu_f = -1e-06",
-        ),
+        (f"{BALL}m = 1\n[fluid]\nnu_f = 1e-6\nrho_f = 1.0\nrho_b = 2.0", "m follows"),
+        (f"{BALL}[fluid]\nnu = 1e-6", "unknown fluid property 'nu'"),
+        (f"{BALL}[fluid]\nnu_f = 1e-6\nrho_f = 2.0\nrho_b = 1.0", "floats"),
+        (f"{BALL}[fluid]\nnu_f = -1e-6\nrho_f = 1.0\nrho_b = 2.0", "nu_f = -1e-06"),
         ("fluid = 3", "must be a table"),
         (
             "r = 0.01\nR = '5 cm'\nm = 1\nj = 0.4\nmu = 0.2\neta = 0.2\n"

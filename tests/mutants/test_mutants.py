@@ -89,14 +89,11 @@ def test_the_list_has_a_row_for_each_fault_and_names_tests_that_there_are(tmp_pa
     assert {len(row) for row in rows} == {len(head)}
     assert len(rows) == len(THEORIES) + len(FOR_TESTS) + len(mutants.BY_HAND) + 1
     assert rows[-1] == ["engine", "crooked", "mjsim", "nobody", ""]
-    for named in (
-        *mutants.BY_HAND.values(),
-        *(f"analytic/test_{wrong.test}" for wrong in FOR_TESTS),
-    ):
+    seen_by = (f"analytic/test_{wrong.test}" for wrong in FOR_TESTS)
+    for named in (*mutants.BY_HAND.values(), *seen_by):
         file, _, test = named.partition("::")
-        assert f"def {test}(" in (Path(__file__).parents[1] / f"{file}.py").read_text("utf-8"), (
-            named
-        )
+        text = (Path(__file__).parents[1] / f"{file}.py").read_text("utf-8")
+        assert f"def {test}(" in text, named
 
 
 @pytest.mark.slow
@@ -111,25 +108,10 @@ def test_what_no_measurement_shows_a_unit_test_sees(wrong, tmp_path):
         "def pytest_configure(config): belief.__enter__()\n"
     )
     root = Path(__file__).parents[2]
-    words = [
-        "-p",
-        "believing",
-        "-n0",
-        "-xq",
-        "-p",
-        "no:cacheprovider",
-        f"tests/analytic/test_{file}.py",
-        "-k",
-        test,
-    ]
+    words = f"-p believing -n0 -xq -p no:cacheprovider tests/analytic/test_{file}.py -k {test}"
     where = {**os.environ, "PYTHONPATH": f"{root}{os.pathsep}{tmp_path}"}
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", *words],
-        cwd=root,
-        env=where,
-        capture_output=True,
-        text=True,
-    )
+    line = [sys.executable, "-m", "pytest", *words.split()]
+    done = subprocess.run(line, cwd=root, env=where, capture_output=True, text=True)
     assert "1 failed" in done.stdout, done.stdout
 
 
