@@ -46,6 +46,7 @@ class Sampling:
     """How much is measured: a number a line, with its value at the quick level, by protocol."""
 
     halves: tuple[int, int] = (1, 2)  # what the time step of a pair of runs is divided by
+    field_steps: tuple[int, int, int] = (1, 2, 4)  # the same, of three runs
     sections: int = (
         1  # flows inside a bracket in each round, by which it shrinks to a half or an eighth
     )
@@ -159,7 +160,7 @@ AT_FULL = replace(
 )
 OWN_STEPS = replace(
     # the same run twice: all numbers are extrapolated to no step from several steps
-    AT_QUICK, halves=(2, 2), granted=True, slow=False,
+    AT_QUICK, halves=(2, 2), field_steps=(2, 2, 2), granted=True, slow=False,
     settling_rounds=(0.45, 1.0, 1.0),
     settled_starts=(("with the fluid", (0.62, 1.7, 4.2)), ("on the wall", (1.7, 4.2))),
     settled_loose=100.0,

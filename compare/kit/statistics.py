@@ -281,6 +281,15 @@ def propagator(record: Array, lag: int) -> Array:
     return np.asarray(np.linalg.solve(gram, np.einsum("nij,nkj->ik", now, later)).T)
 
 
+def propagator_error(record: Array, lag: int) -> float:
+    """Standard uncertainty of the entries of a `propagator` from what it can't explain of a record,
+    as if that were the same at all samples: solvers' errors may be of one sign."""
+    now, left = record[:-lag], record[lag:] - propagator(record, lag) @ record[:-lag]
+    gram = np.einsum("nij,nkj->ik", now, now)
+    sizes = np.einsum("nij->i", left**2)
+    return math.sqrt(float(sizes.max()) * float(np.linalg.inv(gram).diagonal().max()))
+
+
 def exponents(
     at: Callable[[int], Array], interval: float, longest: int
 ) -> npt.NDArray[np.complex128]:

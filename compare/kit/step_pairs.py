@@ -1,4 +1,4 @@
-"""Motions with one time step and with a shorter one, whose difference is the error.
+"""Motions with one time step and with shorter ones, whose differences show the error.
 
 Trials, of any length; and records of a few steps: polynomials through one give values and rates of
 change, whose uncertainty is what the step and the degree change."""
@@ -35,12 +35,12 @@ class Start:
 
 @dataclass(frozen=True, eq=False)
 class StepPair(Start):
-    """A motion that is run with two time steps."""
+    """A motion that is run with two time steps, or with three."""
 
     t_end: float
     """s"""
-    divisors: tuple[int, int]
-    """Time steps in one of `coarse_step`, fewer first."""
+    divisors: tuple[int, ...]
+    """Time steps in one of `coarse_step`, the fewest first."""
     samples: int | None = None
     """None for every step."""
     read: Callable[..., Any] = lambda run: run
@@ -56,14 +56,24 @@ class StepPair(Start):
 
 @dataclass(frozen=True, eq=False)
 class StepPairResult:
-    """What was read from a pair with the coarser and with the finer time step."""
+    """What was read from a pair with each time step."""
 
     protocol: str
     pair: StepPair
     tasks: Sequence[Task] = field(repr=False)
-    """The runs, those with the coarser step first."""
-    coarse: Any
-    fine: Any
+    """The runs, those with the coarsest step first."""
+    reads: Sequence[Any]
+    """One for each step, the coarsest first."""
+
+    @property
+    def coarse(self) -> Any:
+        """What was read with the finest step but one."""
+        return self.reads[-2]
+
+    @property
+    def fine(self) -> Any:
+        """What was read with the finest step."""
+        return self.reads[-1]
 
     def row(
         self, runner: Runner, quantity: str, value: Estimate | float, **conditions: Condition
@@ -91,10 +101,9 @@ def carry_out(
         if isinstance(runs, str):
             yield Missing(protocol, pair.set, f"{pair.name}: the run {runs}", pair.rows)
         else:
-            half = len(runs) // 2
-            yield StepPairResult(
-                protocol, pair, own, pair.read(*runs[:half]), pair.read(*runs[half:])
-            )
+            each = len(runs) // len(pair.divisors)
+            reads = [pair.read(*runs[k : k + each]) for k in range(0, len(runs), each)]
+            yield StepPairResult(protocol, pair, own, reads)
 
 
 EXTRAPOLATION, DOUBT = 1 / 2, 1 / math.sqrt(12)
@@ -115,6 +124,22 @@ def of_no_step(coarse: float, fine: Estimate) -> Estimate:
     return replace(fine, value=fine.value + change * EXTRAPOLATION).also(
         time_step=abs(change) * DOUBT
     )
+
+
+def of_three_steps(values: Array) -> tuple[Array, Array]:
+    """Limits (n,) of a vanishing step of values (3, n) with a step, half of it, and a quarter,
+    in two ways, each (n,).
+
+    The first is free of errors of first and second order; the second is by the order that each
+    number shows, no less than the first. Where one power of the step is all there is, whichever,
+    the second is right; where the first two are, the first. The difference is the first's standard
+    uncertainty. (As a bound, uniformly distributed, it was too little: on 17 sets 8 of 4527 numbers
+    were off by more than three uncertainties.)"""
+    before, last = np.diff(values, axis=0)
+    ratios = np.divide(last, before, out=np.zeros_like(last), where=before != 0)
+    ratios = np.clip(ratios, 0.0, 0.5)
+    limits = values[2] + (5 * last - before) / 3
+    return limits, values[2] + last * ratios / (1 - ratios)
 
 
 def unlike(changes: Array) -> Array:

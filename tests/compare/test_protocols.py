@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy import linalg
 
 import analytic
 from analytic.flowmeter import pulsation
@@ -27,10 +28,12 @@ from compare.kit.statistics import (
     estimate,
     extrapolated_maximum,
     hops,
+    propagator,
+    propagator_error,
     uniform,
     zero_and_slope,
 )
-from compare.kit.step_pairs import of_no_step, unlike
+from compare.kit.step_pairs import of_no_step, of_three_steps, unlike
 from compare.subjects.attractors import measure as attractors
 from compare.subjects.flowmeter import measure as flowmeter
 from compare.subjects.motion import measure as moving
@@ -192,11 +195,34 @@ def test_a_limit_of_no_step_is_sure_whatever_the_order(order, off):
     assert limit.budget == {"time_step": pytest.approx((coarse - fine) / math.sqrt(12))}
 
 
+@pytest.mark.parametrize(
+    ("first", "second", "third"), [(0.1, 0, 0), (0, 0.1, 0), (0.1, -0.1, 0), (0, 0, 0.1), (0, 0, 0)]
+)
+def test_three_steps_leave_no_error_of_first_or_second_order(first, second, third):
+    values = [7.0 + first * h + second * h**2 + third * h**3 for h in (1.0, 0.5, 0.25)]
+    (limit,), (other,) = of_three_steps(np.array(values)[:, None])
+    off, least = abs(limit - other), 1e-13  # round-off
+    assert abs(limit - 7.0) <= off + least
+    assert bool(third) == (abs(limit - 7.0) > least)
+    # where one power shows, the other way to the limit finds it, too
+    assert (off > least) == bool(third or (first and second))
+
+
 def test_what_changes_by_little_among_what_changes_by_much_is_not_sure():
     assert unlike(np.array([4e-3, -1e-9, 0.0])) == pytest.approx(
         [math.hypot(4, 1) / 1e3, 1e-3, 1e-3]
     )
     assert unlike(np.zeros(0)).size == 0
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-9, 1e-6])
+def test_a_propagator_is_as_sure_as_it_explains_its_record(noise):
+    exponents = np.array([[-0.02, 0.05], [-0.05, -0.02]])
+    record = np.array([linalg.expm(k * exponents) for k in range(64)])
+    record += noise * np.random.default_rng(3).standard_normal(record.shape)
+    error = np.abs(propagator(record, 8) - linalg.expm(8 * exponents)).max()
+    assert error <= COVERAGE * propagator_error(record, 8) + 1e-14
+    assert propagator_error(record, 8) <= 30 * noise + 1e-14
 
 
 def test_a_pair_of_steps_shows_the_error_of_an_engine_that_has_none(runner):

@@ -45,17 +45,15 @@ from compare.kit.scales import time_unit
 from compare.kit.settling import PRESSES, settled_readings
 from compare.kit.statistics import Estimate, estimate, uniform
 from compare.kit.step_pairs import (
-    DOUBT,
-    EXTRAPOLATION,
     HALF_WINDOW,
     STEP_RATIO,
-    WINDOW_DEGREES,
     Start,
     StepPair,
     StepPairResult,
     carry_out,
     constrained,
     lag_error,
+    of_three_steps,
     polynomials,
     random_state,
     unlike,
@@ -235,6 +233,9 @@ WINDOW_CENTRES = (16, 40, 64)
 """Of the windows in which equations of motion are looked at; in steps of the coarser run."""
 AROUND_WINDOW = 4
 """Steps in which the case doesn't change, either: friction has built up."""
+FIELD_DEGREES = 7, 5
+"""Of the polynomials through a window; the lower one shows what the degree changes. (They were 5
+and 3: without the errors of the step, degree 5 was off by more than it differs from 3.)"""
 LOADS_FOUND = 1e-7
 """Part of a weight, or of gravity, to which a law of rigid contacts finds what they bear in a
 motion: a hundredth of its share. (Chosen after a measurement.)"""
@@ -256,7 +257,7 @@ MOVING = {
 
 def field(runner: Runner, sets: Sets, records: Records) -> Measured:
     """Rates of change and contact forces, each with the state they belong to."""
-    divisors = (STEP_RATIO * runner.sampling.halves[0], STEP_RATIO * runner.sampling.halves[1])
+    divisors = tuple(STEP_RATIO * times for times in runner.sampling.field_steps)
     pairs = []
     for name, p in sets.items():
         rng = np.random.default_rng([STATES_SEED, *name.encode()])
@@ -288,7 +289,7 @@ def field(runner: Runner, sets: Sets, records: Records) -> Measured:
     for centre, result in product(WINDOW_CENTRES, results):
         set = result.pair.set
         p = result.pair.p
-        case = Case(int(result.coarse.case[centre * runner.sampling.halves[0]]))
+        case = Case(int(result.coarse.case[centre * runner.sampling.field_steps[1]]))
         enough = kept[set, p.nu_f, case] >= runner.sampling.field_kept
         if not enough and (found := _values(runner, case, result, centre)):
             kept[set, p.nu_f, case] += 1
@@ -310,10 +311,10 @@ def _values(
 ) -> tuple[Array, dict[str, Estimate]] | None:
     """State (8,), rates and forces amid a window; None if it changes case, or `turns_or_hovers`.
 
-    They are extrapolated to a vanishing step, and uncertain by what this and the degree of the
-    polynomials change, see `pairs.unlike`."""
+    They are extrapolated to a vanishing step, see `of_three_steps`, and uncertain by what that may
+    leave, and by what the degree of the polynomials changes of the limit, see `unlike`."""
     p, read = result.pair.p, []
-    for run, times in zip((result.coarse, result.fine), runner.sampling.halves, strict=True):
+    for run, times in zip(result.reads, runner.sampling.field_steps, strict=True):
         near = (HALF_WINDOW + AROUND_WINDOW) * times
         half = HALF_WINDOW * times
         middle = centre * times
@@ -326,14 +327,14 @@ def _values(
         # The forces of a sample act from then on for a step: they belong to the middle of it.
         acting = time + (time[1] - time[0]) / runner.divisor / 2
         forces = polynomials(
-            acting, np.concatenate([run.force_A, run.force_B], axis=1)[window], WINDOW_DEGREES, at
+            acting, np.concatenate([run.force_A, run.force_B], axis=1)[window], FIELD_DEGREES, at
         )[0]
         read.append(
-            np.concatenate([*polynomials(time, run.x[window], WINDOW_DEGREES, at), forces], axis=1)
+            np.concatenate([*polynomials(time, run.x[window], FIELD_DEGREES, at), forces], axis=1)
         )
-    (one, _), (two, lower) = read
-    # (3, 22): state, rates, forces at A and B
-    rows = np.stack([two + (two - one) * EXTRAPOLATION, two, lower])
+    # (3, 22) of each degree: state, rates, forces at A and B
+    (limit, other), (lower, _) = (of_three_steps(of) for of in np.stack(read, axis=1))
+    rows = np.stack([limit, other, lower])
     speed, spin, weight = math.sqrt(p.g * p.R), p.g / p.r, p.m * p.g
     scales = np.array([speed, p.g, p.g / p.R, spin, spin, spin, speed, p.g])
     moving, held = MOVING[case], [_forces(case, row) for row in rows[:, 16:]]
@@ -342,8 +343,8 @@ def _values(
         f"moving_force_{name}": (np.array([each[name] for each in held]), weight)
         for name in held[0]
     }
-    best, fine, lower = np.transpose([of / size for of, size in read_off.values()])
-    steps, degrees = unlike(best - fine), unlike(fine - lower)
+    best, other, lower = np.transpose([of / size for of, size in read_off.values()])
+    steps, degrees = unlike(best - other), unlike(best - lower)
     # A contact that rolls is held by friction of a moment ago: its slip should not change at all,
     # and what it changes comes from the rates of other variables.
     slips = [k for k in range(8)[SLIP_XYZ] if VARIABLES[k] in TRAITS[case].constraints]
@@ -352,8 +353,8 @@ def _values(
     for k, (name, (of, size)) in enumerate(read_off.items()):
         causes = {"rolling": uniform(rolling)} if name.startswith("rate") else {}
         causes |= {
-            "time_step": float(steps[k]) * DOUBT / EXTRAPOLATION,
-            "degree": uniform(float(degrees[k])),
+            "time_step": float(steps[k]),
+            "degree": float(degrees[k]),
             "solver": uniform(LOADS_FOUND),
         }
         values[name] = estimate(of[0], size, **causes)
@@ -442,7 +443,8 @@ def motions(runner: Runner, sets: Sets, records: Records) -> Measured:
             time = float(run.time[last] - run.time[first])
             at: dict[str, Condition] = {"case": case.name, "time": time, **state_of(x)}
             yield measurement(runner, "motions", name, p, "case", case, [task], **at)
-            divisors, rows = (STEP_RATIO, 2 * STEP_RATIO), len(VARIABLES[TURNING])
+            rows = len(VARIABLES[TURNING])
+            divisors = STEP_RATIO // 2, STEP_RATIO, 2 * STEP_RATIO
             piece = StepPair(name, p, case.name, x, time, divisors, conditions=at, rows=rows)
             again.append(piece)
     for result in carry_out(runner, "motions", again):
@@ -453,22 +455,25 @@ def motions(runner: Runner, sets: Sets, records: Records) -> Measured:
 
 
 def _turns_at_end(runner: Runner, piece: StepPairResult) -> Measured:
-    """How the ball turns at the end of a piece that is run anew with both steps."""
-    pair, ends = piece.pair, (piece.coarse.x[-1], piece.fine.x[-1])
-    if {pair.name} != {Case(int(run.case[-1])).name for run in (piece.coarse, piece.fine)}:
+    """How the ball turns at the end of a piece that is run anew with all steps."""
+    pair = piece.pair
+    if {pair.name} != {Case(int(run.case[-1])).name for run in piece.reads}:
         why = f"a piece that ended in {pair.name} does not with other steps or forces at first"
         yield Missing("motions", pair.set, why, len(VARIABLES[TURNING]))
         return
-    # The change of one variable may vanish by chance, and so may all: the largest, in natural
-    # units, is used, or what forces do that lag behind.
-    units = state_units(pair.p)
-    change = max(float(np.abs((ends[1] - ends[0]) / units).max()), lag_error(pair.p))
     late = closing_error(runner, pair.p) if closes(piece.fine) else 0.0
-    for name, value, unit in zip(
-        VARIABLES[TURNING], ends[1][TURNING].tolist(), units[TURNING].tolist(), strict=True
-    ):
-        read = estimate(value, unit, time_step=uniform(change), closing=late)
+    for name, value, unit, off in list(zip(VARIABLES, *_ends(piece), strict=True))[TURNING]:
+        # where a case changes, steps may by chance agree: forces lag behind
+        read = estimate(value, unit, time_step=max(off, lag_error(pair.p)), closing=late)
         yield piece.row(runner, f"end_{name}", read)
+
+
+def _ends(piece: StepPairResult) -> tuple[list[float], ...]:
+    """Of each variable at the end of a motion: its limit of a vanishing step, its natural unit, and
+    how far off the limit may be, in that."""
+    units = state_units(piece.pair.p)
+    limits, others = of_three_steps(np.stack([run.x[-1] for run in piece.reads]) / units)
+    return (limits * units).tolist(), units.tolist(), unlike(limits - others).tolist()
 
 
 def closes(run: Trajectory) -> bool:
@@ -657,17 +662,10 @@ def whole_runs(runner: Runner, sets: Sets, records: Records) -> Measured:
         else:
             if apart := how in ("smooth wall", "rough floor"):
                 yield run.row(runner, "case", float(fine.case[-1]), time=time)
-            # The change of one variable may vanish by chance: the largest, in natural units, is
-            # used for all.
-            units, ends = state_units(p), (coarse.x[-1], fine.x[-1])
-            change = float(np.abs((ends[1] - ends[0]) / units).max())
-            if apart:  # where it may vanish in all, but for what forces do that lag behind
-                change = max(change, lag_error(p))
-            for variable, value, size in zip(
-                VARIABLES, ends[1].tolist(), units.tolist(), strict=True
-            ):
+            for variable, value, size, off in zip(VARIABLES, *_ends(run), strict=True):
                 if variable == "omega_c" or not apart:
-                    row = estimate(value, size, time_step=uniform(change))
+                    least = lag_error(p) if apart else 0.0  # next to a change of case
+                    row = estimate(value, size, time_step=max(off, least))
                     yield run.row(runner, f"end_{variable}", row, time=time)
 
 
@@ -684,7 +682,7 @@ def _pairs(name: str, p: Parameters) -> Iterator[StepPair]:
         if rate is not None:
             flow, at = late_ramp(p, rate, t_end), at | {"rate": rate}
         return StepPair(
-            name, p, how, x.stacked(), t_end, (8, 16), count, flow=flow, conditions=at, rows=rows
+            name, p, how, x.stacked(), t_end, (4, 8, 16), count, flow=flow, conditions=at, rows=rows
         )
 
     for how, (flow, lasts, x) in RUN_STARTS.items():

@@ -11,6 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
+import numpy as np
+
 from compare.kit import settling
 from compare.kit.programme import Protocol
 from compare.kit.quantities import quantity
@@ -19,7 +21,7 @@ from compare.kit.runner import Runner
 from compare.kit.scales import time_unit
 from compare.kit.settling import SettlingCriteria, SteadyState
 from compare.kit.statistics import Estimate
-from compare.kit.step_pairs import Start
+from compare.kit.step_pairs import Start, unlike
 from model import Case, State
 from model.drag import QUADRATIC
 
@@ -112,14 +114,13 @@ def _values(
                 if all(n in each.values for each in (fine, *same))
             }
             changes = [
-                abs(s.values[n].value - fine.values[n].value) / sizes[n]
-                for s in same
-                for n in sizes
+                max(abs(s.values[n].value - fine.values[n].value) for s in same) / size
+                for n, size in sizes.items()
             ]
             divisor = runner.sampling.settled_divisor
-            for n, size in sizes.items():
-                change = max(changes) * size
-                sure = settling.with_changes(fine.values[n], change, p, size, divisor)
+            for (n, size), change in zip(sizes.items(), unlike(np.array(changes)), strict=True):
+                off = float(change) * size
+                sure = settling.with_changes(fine.values[n], off, p, size, divisor)
                 yield _row(runner, fine, n, sure, protocol)
 
 
