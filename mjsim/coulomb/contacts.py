@@ -205,30 +205,44 @@ def jacobian_length(model: Any, data: Any, memory: Any) -> int:
 @kernel
 def copy_jacobians(model: Any, data: Any, memory: Any) -> None:
     """Copy the Jacobians of all rows, without zeros: MuJoCo's own are gone when the next step asks
-    for forces."""
-    rows = rows_of(memory)
-    sparse = mj_isSparse(memory.model)
-    limit = reals(data.efc_frictionloss, data.nefc)
+    for forces. Those of a contact keep the same columns."""
+    find_kinds(data, memory)
+    rows, sparse = rows_of(memory), mj_isSparse(memory.model)
     lengths, begins = integers(data.efc_J_rownnz, data.nefc), integers(data.efc_J_rowadr, data.nefc)
-    size, total = jacobian_length(model, data, memory), 0
+    size, total, u = jacobian_length(model, data, memory), 0, 0
     given, columns = reals(data.efc_J, size), integers(data.efc_J_colind, size)
     jacobian, column = reals(memory.jacobian_at, size), integers(memory.column_at, size)
+    while u < len(rows):
+        dim, length = rows[u].dim, lengths[u] if sparse else model.nv
+        begin = begins[u] if sparse else u * length
+        for r in range(dim):
+            rows[u + r].first = total
+            for n in range(begin, begin + length):
+                some = False
+                for s in range(dim):
+                    some = some or given[n + s * length] != 0
+                if some:
+                    jacobian[total] = given[n + r * length]
+                    column[total] = columns[n] if sparse else n - begin
+                    total += 1
+            rows[u + r].length = total - rows[u + r].first
+        u += dim
+
+
+@kernel
+def find_kinds(data: Any, memory: Any) -> None:
+    """Find what each row is, and how many belong to a contact."""
+    rows, limit = rows_of(memory), reals(data.efc_frictionloss, data.nefc)
+    found, contacts = engine_contacts(data.contact, data.ncon), contacts_of(memory)
     for r in range(len(rows)):
-        row, begin = rows[r], begins[r] if sparse else r * model.nv
-        row.first, row.limit = total, limit[r]
-        for n in range(begin, begin + (lengths[r] if sparse else model.nv)):
-            if given[n] != 0:
-                jacobian[total], column[total] = given[n], columns[n] if sparse else n - begin
-                total += 1
-        row.length = total - row.first
-        row.kind, row.remembered = ONE_SIDED if r >= data.ne + data.nf else EQUALITY, 0.0
-        if data.ne <= r < data.ne + data.nf:
-            row.kind = DRY
-    found = engine_contacts(data.contact, data.ncon)
+        row = rows[r]
+        row.kind, row.dim, row.remembered, row.limit = EQUALITY, 1, 0.0, limit[r]
+        if r >= data.ne:
+            row.kind = DRY if r < data.ne + data.nf else ONE_SIDED
     for i in range(data.ncon):
-        for r in range(found[i].efc_address + 1, found[i].efc_address + found[i].dim):
-            rows[r].kind = IDLE
-    contacts = contacts_of(memory)
+        first = found[i].efc_address
+        for r in range(first, first + found[i].dim if first >= 0 else first):
+            rows[r].kind, rows[r].dim = IDLE if r > first else ONE_SIDED, found[i].dim
     for i in range(memory.contacts):
         for r in range(contacts[i].address, contacts[i].address + contacts[i].dim):
             rows[r].kind = CONTACT_ROW

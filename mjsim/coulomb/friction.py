@@ -96,7 +96,7 @@ def project(rows: Any, contact: Any) -> int:
 def find_forces(model: Any, data: Any, memory: Any) -> float:
     """Find forces, states and slip from the accelerations; how wrong a prediction was, m s-2."""
     contacts, rows, worst = contacts_of(memory), rows_of(memory), 0.0
-    multiply(model, data, memory)
+    multiply(memory, reals(data.qacc, model.nv))
     for r in range(len(rows)):
         rows[r].residual -= rows[r].reference + rows[r].R * rows[r].held
     for i in range(memory.contacts):

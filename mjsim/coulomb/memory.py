@@ -103,6 +103,7 @@ DOF = np.dtype(
         ("closes", _i4),  # of the first one: whether a contact of the island has just closed
         ("place", _i4),  # its number in its island
         ("envelope", _i4),  # where the row of that number begins in the derivative
+        ("reach", _i4),  # where it ends in U
     ]
 )
 """A degree of freedom, in Newton's method."""
@@ -147,7 +148,7 @@ MEMORY = np.dtype(
         *((f"{name}_at", _i8) for name in ("contact", "before", "row", "jacobian", "column")),
         *((f"{name}_at", _i8) for name in ("dry", "pose", "pair", "point", "xpos", "xmat", "body")),
         *((f"{name}_at", _i8) for name in ("restitution", "dof")),
-        *((f"{name}_at", _i8) for name in ("residual", "tried", "step", "lower", "upper")),
+        *((f"{name}_at", _i8) for name in ("residual", "tried", "step", "matrix", "place")),
     ],
     align=True,
 )
@@ -179,6 +180,12 @@ def dofs_of(memory: Any) -> Any:
 def columns_of(memory: Any, row: Any) -> Any:
     """The degrees of freedom that a row moves."""
     return integers(memory.column_at + 4 * row.first, row.length)
+
+
+@view
+def places_of(memory: Any, row: Any) -> Any:
+    """The numbers that these have in their island; all rows of a unit have the same."""
+    return integers(memory.place_at + 4 * row.first, row.length)
 
 
 @view
@@ -235,8 +242,7 @@ class Simulation:
         self._own("dof", np.zeros(nv, DOF))
         for name in ("residual", "tried", "step"):
             self._own(name, np.zeros(nv))
-        for name in ("lower", "upper"):
-            self._own(name, np.zeros((nv, nv)))
+        self._own("matrix", np.zeros((nv, nv)))
         self._own("xpos", np.zeros((model.ngeom, 3)))
         self._own("xmat", np.zeros((model.ngeom, 9)))
         self.make_room(16, 64, 64 * min(model.nv, 16))
@@ -258,7 +264,7 @@ class Simulation:
         kinds: dict[str, dict[str, Any]] = {
             "contacts": {"contact": CONTACT, "before": CONTACT, "pose": MJ_CONTACT, "pair": PAIR},
             "rows": {"row": ROW, "dry": np.float64},
-            "jacobian": {"jacobian": np.float64, "column": np.int32},
+            "jacobian": {"jacobian": np.float64, "column": np.int32, "place": np.int32},
         }
         for room, count in wanted.items():
             if self.record[f"room_{room}"][0] >= count:

@@ -35,9 +35,10 @@ from .memory import (
     contacts_of,
     dofs_of,
     jacobian_of,
+    places_of,
     rows_of,
 )
-from .parameters import DECREASE, FEWER, SHORTEST, STEPS
+from .parameters import DECREASE, EXACT, FEWER, SHORTEST, STEPS
 from .rows import times
 
 # -- forces and their derivatives ------------------------------------------------------------------
@@ -107,20 +108,24 @@ def find_units(memory: Any) -> None:
 
 
 @kernel
-def find_islands(model: Any, memory: Any) -> None:
-    """Find the islands of degrees of freedom that units or joints connect."""
+def find_islands(model: Any, memory: Any, everywhere: bool) -> None:
+    """Find the islands of degrees of freedom that units or joints connect.
+
+    Some contact closes in one of them if it just closes, or `everywhere`.
+    """
     rows, contacts, dofs = rows_of(memory), contacts_of(memory), dofs_of(memory)
     parent = integers(model.dof_parentid, model.nv)
     for i in range(model.nv):
         dofs[i].label = root(dofs, parent[i]) if parent[i] >= 0 else i
-        dofs[i].next, dofs[i].unit, dofs[i].closes = -1, -1, 0
+        dofs[i].next, dofs[i].unit, dofs[i].closes = -1, -1, everywhere
     for u in range(len(rows)):
         rows[u].dof = -1
-        for r in range(u, u + rows[u].dim):
-            for c in columns_of(memory, rows[r]):
-                rows[u].dof = c if rows[u].dof < 0 else rows[u].dof
-                one, other = root(dofs, rows[u].dof), root(dofs, c)
-                dofs[max(one, other)].label = min(one, other)
+        for c in columns_of(memory, rows[u]):
+            if rows[u].dim == 0:
+                break
+            rows[u].dof = c if rows[u].dof < 0 else rows[u].dof
+            one, other = root(dofs, rows[u].dof), root(dofs, c)
+            dofs[max(one, other)].label = min(one, other)
     for i in range(model.nv - 1, -1, -1):
         first = root(dofs, i)
         dofs[i].label = first
@@ -148,25 +153,28 @@ def root(dofs: Any, i: int) -> int:
 
 @kernel
 def find_envelope(model: Any, memory: Any, first: int) -> int:
-    """Number an island's degrees of freedom, and find where rows of its derivative begin; its
-    size."""
+    """Number an island's degrees of freedom; find where rows of its derivative begin, and how far
+    those of its upper triangle reach; its size."""
     starts, columns = integers(model.M_rowadr, model.nv), integers(model.M_colind, model.nC)
     rows, dofs, i, size = rows_of(memory), dofs_of(memory), first, 0
     while i >= 0:
         dofs[i].place = size
-        dofs[size].envelope = dofs[columns[starts[i]]].place
+        dofs[size].envelope, dofs[size].reach = dofs[columns[starts[i]]].place, size
         i, size = dofs[i].next, size + 1
     u = dofs[first].unit
     while u >= 0:
-        least = size
-        for r in range(u, u + rows[u].dim):
-            for c in columns_of(memory, rows[r]):
-                least = min(least, dofs[c].place)
-        for r in range(u, u + rows[u].dim):
-            for c in columns_of(memory, rows[r]):
-                begins = dofs[dofs[c].place]
-                begins.envelope = min(begins.envelope, least)
+        column, place, least = columns_of(memory, rows[u]), places_of(memory, rows[u]), size
+        for n in range(len(place)):
+            place[n] = dofs[column[n]].place
+            least = min(least, place[n])
+        for k in place:
+            dofs[k].envelope = min(dofs[k].envelope, least)
         u = rows[u].next
+    for k in range(size):
+        begin = dofs[dofs[k].envelope]
+        begin.reach = max(begin.reach, k)
+    for k in range(1, size):
+        dofs[k].reach = max(dofs[k].reach, dofs[k - 1].reach)
     return size
 
 
@@ -210,99 +218,88 @@ def find_residual(model: Any, data: Any, memory: Any, first: int, a: Any) -> flo
 
 
 @kernel
-def assemble(model: Any, data: Any, memory: Any, first: int, lower: Any, upper: Any) -> None:
-    """The derivative of the residual: its lower triangle, and its upper one transposed."""
+def assemble(model: Any, data: Any, memory: Any, first: int, matrix: Any) -> None:
+    """The derivative of the residual of an island."""
     rows, contacts, dofs = rows_of(memory), contacts_of(memory), dofs_of(memory)
     starts, lengths = integers(model.M_rowadr, model.nv), integers(model.M_rownnz, model.nv)
     columns, inertia = integers(model.M_colind, model.nC), reals(data.M, model.nC)
+    for k in range(len(matrix)):
+        for n in range(dofs[k].envelope, dofs[k].reach + 1):
+            matrix[k, n] = 0.0
     i = first
     while i >= 0:
         k = dofs[i].place
-        for n in range(dofs[k].envelope, k + 1):
-            lower[k, n] = upper[k, n] = 0.0
         for n in range(starts[i], starts[i] + lengths[i]):
-            lower[k, dofs[columns[n]].place] = upper[k, dofs[columns[n]].place] = inertia[n]
+            m = dofs[columns[n]].place
+            matrix[k, m] = matrix[m, k] = inertia[n]
         i = dofs[i].next
     u = dofs[first].unit
     while u >= 0:
-        unit = rows[u]
+        unit, place = rows[u], places_of(memory, rows[u])
         for r in range(unit.dim if unit.force != 0 else 0):
             for s in range(unit.dim):
                 factor = row_stiffness(unit)
                 if unit.contact >= 0:
                     factor = stiffness(rows, contacts[unit.contact], r, s)
                 if factor != 0:
-                    add_product(memory, factor, rows[u + r], rows[u + s], lower, upper)
+                    add_product(memory, factor, rows[u + r], rows[u + s], place, matrix)
         u = unit.next
 
 
 @kernel
-def add_product(memory: Any, factor: float, row: Any, other: Any, lower: Any, upper: Any) -> None:
-    """Add the product of the Jacobians of two rows, times a factor."""
-    dofs, column, across = dofs_of(memory), columns_of(memory, row), columns_of(memory, other)
+def add_product(memory: Any, factor: float, row: Any, other: Any, place: Any, matrix: Any) -> None:
+    """Add the product of the Jacobians of two rows of a unit, times a factor."""
     jacobian, second = jacobian_of(memory, row), jacobian_of(memory, other)
-    for n in range(len(column)):
-        i, scaled = dofs[column[n]].place, factor * jacobian[n]
-        for k in range(len(across)):
-            j = dofs[across[k]].place
-            if j <= i:
-                lower[i, j] += scaled * second[k]
-            if j >= i:
-                upper[j, i] += scaled * second[k]
+    for n in range(len(place)):
+        own, scaled = matrix[place[n]], factor * jacobian[n]
+        for k in range(len(place)):
+            own[place[k]] += scaled * second[k]
 
 
 @kernel
-def factorise(lower: Any, upper: Any, dofs: Any) -> None:
-    """L and U within their envelope. No pivots are chosen: a large R keeps diagonals large."""
-    for i in range(len(lower)):
-        own_lower, own_upper, begin = lower[i], upper[i], dofs[i].envelope
-        for j in range(begin, i):
-            other_lower, other_upper, below, above = lower[j], upper[j], 0.0, 0.0
+def factorise(matrix: Any, dofs: Any) -> None:
+    """L and U in the matrix's place. No pivots are chosen: a large R keeps diagonals large."""
+    for i in range(len(matrix)):
+        own = matrix[i]
+        for k in range(dofs[i].envelope, i):
+            other = matrix[k]
+            own[k] /= other[k]
             # numbers without a sign: numba then needs no look at negative ones
-            for k in range(np.uint64(max(begin, dofs[j].envelope)), np.uint64(j)):
-                below += own_lower[k] * other_upper[k]
-                above += own_upper[k] * other_lower[k]
-            own_lower[j] = (own_lower[j] - below) / other_upper[j]
-            own_upper[j] -= above
-        total = 0.0
-        for k in range(np.uint64(begin), np.uint64(i)):
-            total += own_lower[k] * own_upper[k]
-        own_upper[i] -= total
+            for j in range(np.uint64(k + 1), np.uint64(dofs[k].reach + 1)):
+                own[j] -= own[k] * other[j]
 
 
 @kernel
-def substitute(lower: Any, upper: Any, dofs: Any, x: Any) -> None:
+def substitute(matrix: Any, dofs: Any, x: Any) -> None:
     """Solve L U x = x."""
-    for i in range(len(lower)):
-        total = 0.0
+    for i in range(len(matrix)):
         for k in range(dofs[i].envelope, i):
-            total += lower[i, k] * x[k]
-        x[i] -= total
-    for i in range(len(lower) - 1, -1, -1):
-        x[i] /= upper[i, i]
-        for k in range(dofs[i].envelope, i):
-            x[k] -= upper[i, k] * x[i]
+            x[i] -= matrix[i, k] * x[k]
+    for i in range(len(matrix) - 1, -1, -1):
+        for k in range(i + 1, dofs[i].reach + 1):
+            x[i] -= matrix[i, k] * x[k]
+        x[i] /= matrix[i, i]
 
 
 @kernel
-def solve_island(model: Any, data: Any, memory: Any, first: int, a: Any, enough: float) -> None:
-    """Newton's method for the accelerations of an island, to `enough`."""
+def solve_island(model: Any, data: Any, memory: Any, first: int, a: Any) -> bool:
+    """Newton's method for the accelerations of an island; whether it came to an end."""
     dofs, size = dofs_of(memory), find_envelope(model, memory, first)
-    lower, upper = reals(memory.lower_at, (size, size)), reals(memory.upper_at, (size, size))
+    matrix, step = reals(memory.matrix_at, (size, size)), reals(memory.step_at, size)
     residual, tried = reals(memory.residual_at, model.nv), reals(memory.tried_at, model.nv)
-    step = reals(memory.step_at, size)
+    enough = EXACT * forces_without_contacts(model, data, memory, first)
     square = find_residual(model, data, memory, first, a)
     for _ in range(STEPS):
         if square <= enough**2:
-            return
-        assemble(model, data, memory, first, lower, upper)
-        factorise(lower, upper, dofs)
+            return True
+        assemble(model, data, memory, first, matrix)
+        factorise(matrix, dofs)
         memory.factorisations += 1
         i = first
         while i >= 0:
             step[dofs[i].place] = -residual[i]
             i = dofs[i].next
-        substitute(lower, upper, dofs, step)
+        substitute(matrix, dofs, step)
         share, before = 1.0, square
         while True:
             i = first
@@ -317,6 +314,7 @@ def solve_island(model: Any, data: Any, memory: Any, first: int, a: Any, enough:
         while i >= 0:
             a[i] = tried[i]
             i = dofs[i].next
+    return False
 
 
 @kernel
@@ -346,22 +344,19 @@ def hold_forces(memory: Any, first: int) -> float:
 
 
 @kernel
-def solve_contacts(
-    model: Any, data: Any, memory: Any, a: Any, accuracy: float, enough: float
-) -> None:
+def solve_contacts(model: Any, data: Any, memory: Any, a: Any, enough: float) -> bool:
     """Solve for the accelerations `a` with contacts that close, until none closes that was open.
 
-    `accuracy`: of forces, in units of those without contacts; `enough`: acceleration by which R may
-    make contacts give way, m s-2. Forces, states and residuals of rows are those that it comes to.
+    `enough`: acceleration by which R may make contacts give way, m s-2. Slip that is predicted, and
+    forces that are held, are those that it comes to. Returns whether it came to an end.
     """
     contacts, rows = contacts_of(memory), rows_of(memory)
     find_residuals(memory, a)
     for k in range(memory.contacts):
         contact, normal = contacts[k], rows[contacts[k].address]
         contact.state = STICKS if normal.residual < 0 or normal.held > 0 else OPEN
-        contact.closes = 1
-    for _ in range(memory.law.most):
-        solve_closed(model, data, memory, a, accuracy, enough)
+    for n in range(memory.law.most):
+        solved = solve_closed(model, data, memory, a, enough, n == 0)
         find_residuals(memory, a)
         some = False
         for k in range(memory.contacts):
@@ -369,9 +364,11 @@ def solve_contacts(
             contact.state = contact_forces(rows, contact)
             contact.closes = was_open and contact.state != OPEN
             contact.predicted = shift(rows, contact) if contact.state != STICKS else 0.0
+            contact.extrapolated = -1.0
             some = some or contact.closes
         if not some:
-            return
+            return bool(solved)
+    return False
 
 
 @kernel
@@ -386,16 +383,21 @@ def find_residuals(memory: Any, a: Any) -> None:
 
 @kernel
 def solve_closed(
-    model: Any, data: Any, memory: Any, a: Any, accuracy: float, enough: float
-) -> None:
-    """Solve for the accelerations of all islands of closed contacts of which one just closes."""
+    model: Any, data: Any, memory: Any, a: Any, enough: float, everywhere: bool
+) -> bool:
+    """Solve for the accelerations of islands of closed contacts: of all, or where one just closes.
+
+    Returns whether all came to an end.
+    """
     find_units(memory)
-    find_islands(model, memory)
-    dofs = dofs_of(memory)
+    find_islands(model, memory, everywhere)
+    dofs, solved = dofs_of(memory), True
     for first in range(model.nv):
         if dofs[first].label == first and dofs[first].closes:
-            small = accuracy * forces_without_contacts(model, data, memory, first)
+            gives_way = math.inf
             for _ in range(memory.law.most):
-                solve_island(model, data, memory, first, a, small)
-                if hold_forces(memory, first) <= enough:
-                    break
+                if gives_way > enough:
+                    solved &= solve_island(model, data, memory, first, a)
+                    gives_way = hold_forces(memory, first)
+            solved &= gives_way <= enough
+    return solved

@@ -81,18 +81,16 @@ CORNER = 1.05 * math.pi
 """Angle without other points of its patch that a corner of the patch sees at least."""
 STEPS = 40
 """Factorisations that Newton's method may take for an island."""
-EXACT = 1e-4
+EXACT = 1e-8
 """Part of the forces without contacts to which it solves."""
 FEWER, DECREASE, SHORTEST = 0.5, 1e-4, 1e-3
 """By what a Newton step is shortened; by how much, relative to its length, the residual must fall;
 the shortest."""
-SOFTER = 100.0
+SOFTER = 30.0
 """How much larger R is in Newton's method, until what contacts hold takes its part away."""
 FEEDBACK, STEADIER = 0.5, 1e-4
 """`friction.feedback` beyond which errors of predicted slip grow from step to step; part of `share`
 to which it must be known there."""
-FALLING = 0.1
-"""Part to which the error of rigid contacts must fall by a solution for another one to be tried."""
 OVER = 0.75
 """Part of a time step after which the next one has begun: stages of Runge and Kutta are in one."""
 NEXT = 1.5

@@ -47,7 +47,6 @@ def stiffen(model: Any, data: Any, memory: Any, gravity: float) -> None:
         for r in range(first, first + contact.dim):
             R[r] *= factor
             reference[r] = ((goal if r == first else 0.0) - velocity[r]) / h
-    share_softness(model, data, memory)
 
 
 @kernel
@@ -94,9 +93,10 @@ def share_softness(model: Any, data: Any, memory: Any) -> None:
     R, D = reals(data.efc_R, data.nefc), reals(data.efc_D, data.nefc)
     island_R, island_D = reals(data.iefc_R, data.nefc), reals(data.iefc_D, data.nefc)
     place, contacts = integers(data.map_efc2iefc, data.nefc), contacts_of(memory)
+    rows = rows_of(memory)
     for i in range(memory.contacts):
         for r in range(contacts[i].address, contacts[i].address + contacts[i].dim):
-            D[r] = 1 / R[r]
+            R[r], D[r] = rows[r].R, 1 / rows[r].R
             if data.nisland > 0:
                 island_R[place[r]], island_D[place[r]] = R[r], D[r]
     if model.opt.solver == PGS:

@@ -20,9 +20,9 @@ def times(memory: Any, row: Any, vector: Any) -> float:
 
 
 @kernel
-def multiply(model: Any, data: Any, memory: Any) -> None:
+def multiply(memory: Any, accelerations: Any) -> None:
     """Set the residuals of all rows to their Jacobian times the accelerations."""
-    rows, accelerations = rows_of(memory), reals(data.qacc, model.nv)
+    rows = rows_of(memory)
     for r in range(len(rows)):
         rows[r].residual = times(memory, rows[r], accelerations)
 

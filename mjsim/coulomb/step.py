@@ -40,11 +40,12 @@ from .friction import (
 )
 from .memory import CONTACT_ROW, DRY, contacts_of, memories, rows_of
 from .newton import solve_contacts
-from .parameters import EXACT, FALLING, NEXT, OVER, SOFTER
+from .parameters import NEXT, OVER, SOFTER
 from .rigid import (
     add_dampers,
     add_gyroscopic_moments,
     oppose_slip_at_mid_step,
+    share_softness,
     stiffen,
     take_depth_away,
     turn_accelerations,
@@ -89,12 +90,9 @@ def law_of_a_step(m: int, d: int, at: int) -> None:
     enough = memory.law.share * gravity
     if memory.law.kinetic < 1:
         weaken(model, data, memory, gravity)
-    multiply(model, data, memory)
+    multiply(memory, reals(data.qacc, model.nv))
     if memory.law.rigid:
         stiffen(model, data, memory, gravity)
-        if data.nefc != memory.rows:  # MuJoCo's memory was too small, and it has dropped all rows
-            forget_contacts(memory)
-            return
     elif memory.law.servo:
         take_depth_away(model, data, memory)
     if since > 0 and known and not still:
@@ -104,6 +102,11 @@ def law_of_a_step(m: int, d: int, at: int) -> None:
         solve(model, data, memory, enough, gravity)
     elif memory.law.rigid:
         oppose_slip_at_mid_step(model, data, memory, gravity)
+    if memory.law.rigid:
+        share_softness(model, data, memory)
+        if data.nefc != memory.rows:  # MuJoCo's memory was too small, and it has dropped all rows
+            forget_contacts(memory)
+            return
     write_references(data, memory)
 
 
@@ -191,60 +194,51 @@ def size_of_gravity(model: Any) -> float:
 
 @kernel
 def solve(model: Any, data: Any, memory: Any, enough: float, gravity: float) -> None:
-    """Solve for the accelerations, until contacts slip as predicted, to `enough`, m s-2.
+    """Solve the step, until contacts slip as predicted, to `enough`, m s-2.
 
-    Of rigid contacts Newton's method finds slip and forces, for softer ones. Then MuJoCo solves, as
-    it will in the step itself, until what was predicted is what is found; of rigid ones for as long
-    as the error still falls tenfold. Friction at mid step is known last, and asks for a solution
-    more.
+    Of rigid contacts Newton's method finds slip and forces; friction at mid step is known when they
+    slip, and asks for a solution more. In the step itself MuJoCo then solves for what is predicted.
     """
-    start, last, mid_step_due = reals(data.qacc_warmstart, model.nv), math.inf, memory.law.rigid
+    start = reals(data.qacc_warmstart, model.nv)
     mj_fwdActuation(memory.model, memory.data)
     mj_fwdAcceleration(memory.model, memory.data)
     memory.solves += 1
     if memory.law.rigid:
-        soften(memory, SOFTER)
-        solve_contacts(model, data, memory, start, EXACT, enough)
-        soften(memory, 1 / SOFTER)
+        soften(memory)
+        solved = solve_contacts(model, data, memory, start, enough)
+        multiply(memory, start)
+        subtract_references(memory)
+        if oppose_slip_at_mid_step(model, data, memory, gravity):
+            solved &= solve_contacts(model, data, memory, start, enough)
+    else:
+        solved = iterate(model, data, memory, start, enough)
+    memory.unsolved += not solved
+
+
+@kernel
+def iterate(model: Any, data: Any, memory: Any, start: Any, enough: float) -> bool:
+    """Let MuJoCo solve for the slip that was found last, until it is found again."""
+    contacts, acceleration = contacts_of(memory), reals(data.qacc, model.nv)
     for _ in range(memory.law.most):
         write_references(data, memory)
         mj_fwdConstraint(memory.model, memory.data)
-        qacc = reals(data.qacc, model.nv)
         for i in range(model.nv):
-            start[i] = qacc[i]
+            start[i] = acceleration[i]
         worst = find_forces(model, data, memory)
-        hold_what_was_found(memory)
-        good = worst <= enough and (not memory.law.rigid or worst > FALLING * last)
-        if good or worst <= EXACT * enough:
-            if not mid_step_due:
-                return
-            multiply(model, data, memory)
-            subtract_references(memory)
-            if not oppose_slip_at_mid_step(model, data, memory, gravity):
-                return
-            mid_step_due, worst = False, math.inf
-        last = worst
-    memory.unsolved += 1
+        for i in range(memory.contacts):
+            contacts[i].predicted, contacts[i].extrapolated = contacts[i].found, -1.0
+        if worst <= enough:
+            return True
+    return False
 
 
 @kernel
-def hold_what_was_found(memory: Any) -> None:
-    """Predict the slip that was found; rigid contacts hold the forces."""
-    contacts, rows = contacts_of(memory), rows_of(memory)
-    for i in range(memory.contacts):  # what a blow does says nothing of the next step
-        contact = contacts[i]
-        contact.predicted, contact.extrapolated = contact.found, -1.0
-        for r in range(contact.address, contact.address + (contact.dim if memory.law.rigid else 0)):
-            rows[r].held = rows[r].remembered = rows[r].force
-
-
-@kernel
-def soften(memory: Any, factor: float) -> None:
+def soften(memory: Any) -> None:
     """Make contacts softer, for a solution in which they come to hold what they bear."""
     contacts, rows = contacts_of(memory), rows_of(memory)
     for i in range(memory.contacts):
         for r in range(contacts[i].address, contacts[i].address + contacts[i].dim):
-            rows[r].R *= factor
+            rows[r].R *= SOFTER
 
 
 # -- MuJoCo's control callback ---------------------------------------------------------------------
