@@ -38,7 +38,7 @@ from .memory import (
     places_of,
     rows_of,
 )
-from .parameters import DECREASE, EXACT, FEWER, SHORTEST, STEPS
+from .parameters import DECREASE, EXACT, FALLING, FEWER, SHORTEST, STEPS
 from .rows import times
 
 # -- forces and their derivatives ------------------------------------------------------------------
@@ -394,10 +394,10 @@ def solve_closed(
     dofs, solved = dofs_of(memory), True
     for first in range(model.nv):
         if dofs[first].label == first and dofs[first].closes:
-            gives_way = math.inf
-            for _ in range(memory.law.most):
-                if gives_way > enough:
-                    solved &= solve_island(model, data, memory, first, a)
-                    gives_way = hold_forces(memory, first)
+            gives_way, last, rounds = math.inf, math.inf, 0
+            while rounds < memory.law.most and (gives_way > enough or gives_way < FALLING * last):
+                solved &= solve_island(model, data, memory, first, a)
+                last, gives_way = gives_way, hold_forces(memory, first)
+                rounds += 1
             solved &= gives_way <= enough
     return solved

@@ -88,6 +88,8 @@ FEWER, DECREASE, SHORTEST = 0.5, 1e-4, 1e-3
 the shortest."""
 SOFTER = 30.0
 """How much larger R is in Newton's method, until what contacts hold takes its part away."""
+FALLING = 0.1
+"""Part to which that must fall by a solution for another one to be tried."""
 FEEDBACK, STEADIER = 0.5, 1e-4
 """`friction.feedback` beyond which errors of predicted slip grow from step to step; part of `share`
 to which it must be known there."""
