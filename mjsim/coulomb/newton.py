@@ -38,7 +38,7 @@ from .memory import (
     places_of,
     rows_of,
 )
-from .parameters import EXACT, FALLING, FLAT, SEARCHES, STEPS
+from .parameters import DECREASE, EXACT, FALLING, FEWER, FLAT, SEARCHES, SHORTEST, STEPS
 from .rows import times
 
 # -- forces and their derivatives ------------------------------------------------------------------
@@ -312,15 +312,21 @@ def solve_island(model: Any, data: Any, memory: Any, first: int, a: Any) -> bool
 def search(model: Any, data: Any, memory: Any, first: int, a: Any, before: float) -> float:
     """Go along Newton's step, `tried`; the square of the residual there, which was `before`.
 
-    All of it, if the residual falls; else to where that is across the step, as it is where a convex
-    function is least: the residual itself hardly falls where friction is about to turn round.
+    All of it or an eighth, if the residual falls; else to where that is across the step, as it is
+    where a convex function is least: the residual hardly falls where friction is about to turn.
     """
     low, high, share, slope = 0.0, 1.0, 1.0, slope_along(model, memory, first)
-    at_low, at_high, begin = slope, 0.0, slope
+    at_low, at_high, begin, square = slope, 0.0, slope, math.inf
+    while square >= (1 - DECREASE * share) ** 2 * before and share > SHORTEST:
+        share *= FEWER
+        square = go_along(model, data, memory, first, a, 2 * share)
+    if square < before:
+        return square
+    share = 1.0
     for n in range(SEARCHES):
         square = go_along(model, data, memory, first, a, share)
         slope = slope_along(model, memory, first)
-        if (share == 1 and square < before) or abs(slope) <= FLAT * abs(begin):
+        if abs(slope) <= FLAT * abs(begin):
             break
         if slope > 0:
             high, at_high = share, slope

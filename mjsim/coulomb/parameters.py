@@ -81,8 +81,9 @@ CORNER = 1.05 * math.pi
 """Angle without other points of its patch that a corner of the patch sees at least."""
 STEPS = 40
 """Factorisations that Newton's method may take for an island."""
-EXACT = 1e-10
+EXACT = 1e-9
 """Part of the forces without contacts to which it solves."""
+FEWER, DECREASE, SHORTEST = 0.5, 1e-4, 0.01
 SEARCHES, FLAT = 30, 0.1
 """Places along a Newton step that may be tried; part of its first slope that counts as none."""
 SOFTER = 30.0
