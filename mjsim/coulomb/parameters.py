@@ -84,12 +84,16 @@ STEPS = 40
 EXACT = 1e-9
 """Part of the forces without contacts to which it solves."""
 FEWER, DECREASE, SHORTEST = 0.5, 1e-4, 0.01
+"""By what a Newton step is shortened; by how much, relative to its length, the residual must fall;
+the shortest for which it may."""
 SEARCHES, FLAT = 30, 0.1
 """Places along a Newton step that may be tried; part of its first slope that counts as none."""
 SOFTER = 30.0
-"""How much larger R is in Newton's method, until what contacts hold takes its part away."""
+"""How much larger R is in a step that Newton's method solves, which holds forces until contacts
+give way no more."""
 FALLING = 0.1
-"""Part to which that must fall by a solution for another one to be tried."""
+"""Part to which what they give way must fall by a solution for another one to be tried, when it is
+little enough."""
 FEEDBACK, STEADIER = 0.5, 1e-4
 """`friction.feedback` beyond which errors of predicted slip grow from step to step; part of `share`
 to which it must be known there."""

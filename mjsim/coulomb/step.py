@@ -197,12 +197,14 @@ def solve(model: Any, data: Any, memory: Any, enough: float, gravity: float) -> 
     """Solve the step, until contacts slip as predicted, to `enough`, m s-2.
 
     Of rigid contacts Newton's method finds slip and forces; friction at mid step is known when they
-    slip, and asks for a solution more. In the step itself MuJoCo then solves for what is predicted.
+    slip, and asks for a solution more. Where it comes to no end, and of soft contacts, MuJoCo
+    solves for the slip that it found last.
     """
     start = reals(data.qacc_warmstart, model.nv)
     mj_fwdActuation(memory.model, memory.data)
     mj_fwdAcceleration(memory.model, memory.data)
     memory.solves += 1
+    solved = False
     if memory.law.rigid:
         soften(memory)
         solved = solve_contacts(model, data, memory, start, enough)
@@ -210,15 +212,19 @@ def solve(model: Any, data: Any, memory: Any, enough: float, gravity: float) -> 
         subtract_references(memory)
         if oppose_slip_at_mid_step(model, data, memory, gravity):
             solved &= solve_contacts(model, data, memory, start, enough)
-    else:
+        if not solved:
+            share_softness(model, data, memory)
+    if not solved and data.nefc == memory.rows:
         solved = iterate(model, data, memory, start, enough)
     memory.unsolved += not solved
 
 
 @kernel
 def iterate(model: Any, data: Any, memory: Any, start: Any, enough: float) -> bool:
-    """Let MuJoCo solve for the slip that was found last, until it is found again."""
-    contacts, acceleration = contacts_of(memory), reals(data.qacc, model.nv)
+    """Let MuJoCo solve for the slip that was found last, until it is found again; rigid contacts
+    hold the forces that were."""
+    contacts, rows = contacts_of(memory), rows_of(memory)
+    acceleration = reals(data.qacc, model.nv)
     for _ in range(memory.law.most):
         write_references(data, memory)
         mj_fwdConstraint(memory.model, memory.data)
@@ -226,7 +232,10 @@ def iterate(model: Any, data: Any, memory: Any, start: Any, enough: float) -> bo
             start[i] = acceleration[i]
         worst = find_forces(model, data, memory)
         for i in range(memory.contacts):
-            contacts[i].predicted, contacts[i].extrapolated = contacts[i].found, -1.0
+            contact = contacts[i]
+            contact.predicted, contact.extrapolated = contact.found, -1.0
+            for r in range(contact.address, contact.address + contact.dim * memory.law.rigid):
+                rows[r].held = rows[r].remembered = rows[r].force
         if worst <= enough:
             return True
     return False
