@@ -99,7 +99,7 @@ def law_of_a_step(m: int, d: int, at: int) -> None:
         add_turning(model, data, memory, since)
     set_up(data, memory)
     if predict_slip(model, data, memory, enough, gravity) or not known:
-        solve(model, data, memory, enough, gravity)
+        solve(model, data, memory, enough, gravity, known)
     elif memory.law.rigid:
         oppose_slip_at_mid_step(model, data, memory, gravity)
     if memory.law.rigid:
@@ -193,7 +193,7 @@ def size_of_gravity(model: Any) -> float:
 
 
 @kernel
-def solve(model: Any, data: Any, memory: Any, enough: float, gravity: float) -> None:
+def solve(model: Any, data: Any, memory: Any, enough: float, gravity: float, known: bool) -> None:
     """Solve the step, until contacts slip as predicted, to `enough`, m s-2.
 
     Of rigid contacts Newton's method finds slip and forces; friction at mid step is known when they
@@ -206,6 +206,13 @@ def solve(model: Any, data: Any, memory: Any, enough: float, gravity: float) -> 
     memory.solves += 1
     solved = False
     if memory.law.rigid:
+        if (
+            not known
+        ):  # how contacts share loads that they can bear in many ways is as MuJoCo has it
+            share_softness(model, data, memory)
+            if data.nefc != memory.rows:
+                return
+            iterate(model, data, memory, start, enough)
         soften(memory)
         solved = solve_contacts(model, data, memory, start, enough)
         multiply(memory, start)
