@@ -89,7 +89,12 @@ def rebound(
 
 @kernel
 def share_softness(model: Any, data: Any, memory: Any) -> None:
-    """Tell the R of contacts to all places where MuJoCo keeps it: D, islands, the matrix of PGS."""
+    """Tell the R of contacts to all places where MuJoCo keeps it: D, islands, the matrix of PGS.
+
+    If its memory is too small for that, it drops all rows.
+    """
+    if data.nefc != memory.rows:
+        return
     R, D = reals(data.efc_R, data.nefc), reals(data.efc_D, data.nefc)
     island_R, island_D = reals(data.iefc_R, data.nefc), reals(data.iefc_D, data.nefc)
     place, contacts = integers(data.map_efc2iefc, data.nefc), contacts_of(memory)

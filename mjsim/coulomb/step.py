@@ -104,7 +104,7 @@ def law_of_a_step(m: int, d: int, at: int) -> None:
         oppose_slip_at_mid_step(model, data, memory, gravity)
     if memory.law.rigid:
         share_softness(model, data, memory)
-        if data.nefc != memory.rows:  # MuJoCo's memory was too small, and it has dropped all rows
+        if data.nefc != memory.rows:
             forget_contacts(memory)
             return
     write_references(data, memory)
@@ -206,9 +206,7 @@ def solve(model: Any, data: Any, memory: Any, enough: float, gravity: float, kno
     memory.solves += 1
     solved = False
     if memory.law.rigid:
-        if (
-            not known
-        ):  # how contacts share loads that they can bear in many ways is as MuJoCo has it
+        if not known:  # loads that contacts can bear in many ways are shared as MuJoCo has it
             share_softness(model, data, memory)
             if data.nefc != memory.rows:
                 return
