@@ -62,8 +62,9 @@ def step_response(p: Parameters, case: Case, t: npt.ArrayLike) -> Array:
 
 
 def peak(p: Parameters, case: Case) -> tuple[float, float]:
-    """Time in s and height of the top of the `step_response`, relative to its end; inf, 1 without
-    overshoot."""
+    """Time in s and height of the top of the `step_response`, relative to its end.
+
+    Without overshoot within eight times of the slowest decay inf, 1."""
     slowest = 1 / np.abs(np.linalg.eigvals(_linearised(p, case)[0]).real).min()
     t = np.linspace(0.0, 8 * slowest, _GRID)
     y = step_response(p, case, t) / (end := np.real(transfer(p, case, 0.0)))

@@ -181,7 +181,7 @@ def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
     because = data["operating_range_ends"]["because"]
     reach = f"It has no operating range: {because}."
     if limit := data["operating_range"]:
-        reach = f"It reads right up to ω₀ = {to_digits(limit, 5)} rad/s: there {because}."
+        reach = f"It rolls with the fluid up to ω₀ = {to_digits(limit, 5)} rad/s: there {because}."
         if math.isinf(data["reading_range"]):
             reach += " ω_c = ω₀ holds in every motion, however fast the flow."
     answer.append(Text(reach, "bold"))

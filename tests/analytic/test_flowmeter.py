@@ -61,6 +61,14 @@ def test_a_peak_lies_between_the_points_of_a_grid():
     assert y[1] == pytest.approx(height, rel=1e-12)
 
 
+def test_a_pulsation_may_need_a_larger_amplitude_than_a_fast_one():
+    """In thick oil."""
+    p = Parameters.named("plastic-in-oil")
+    p = p.replace(omega_0=0.85 * analytic.thresholds(p).omega_01)
+    slow, middle = (pulsation.slip_onset(p, times * p.c) for times in (0.1, 0.9))
+    assert slow < pulsation.fast_onset(p) < 0.995 * middle
+
+
 def test_forces_may_allow_more_on_a_rough_floor():
     """Between (73) and the cone of the floor, see docs/theory.md, section 7; elsewhere both ends of
     RR are one."""

@@ -276,6 +276,22 @@ def test_sampling_seldom_changes_a_jump_and_a_ramp_by_no_more_than_they_are_unsu
     assert once == pytest.approx(again, rel=1e-8)
 
 
+@pytest.mark.parametrize(("overshoot", "seen"), [(1e-4, True), (1e-7, False)])
+def test_a_peak_too_low_to_be_told_from_none_is_not_measured(overshoot, seen):
+    """As of a ball in oil whose swing has died out by then."""
+    time = np.linspace(0.0, 40.0, 8001)
+    rises = 1 - np.exp(-4 * time) + overshoot * np.exp(-((time - 9.0) ** 2))
+    up, down = (
+        SimpleNamespace(time=time, omega_c=12 + side * rises, header=SimpleNamespace(parameters=P))
+        for side in (1e-3, -1e-3)
+    )
+    found = unsteady._jump_quantities(up, down)
+    for quantity, expected in (("jump_peak", 9.0), ("jump_height", 1 + overshoot)):
+        assert found[quantity].value == pytest.approx(
+            expected if seen else math.nan, rel=1e-6, nan_ok=True
+        )
+
+
 def test_a_settled_state_is_no_surer_than_solving_at_random_leaves_it():
     """Also where neither half the step nor other starts change it; what is measured takes the place
     of what errors of one sign could come to."""

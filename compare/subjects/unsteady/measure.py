@@ -484,17 +484,21 @@ def odd_part(up: Trajectory, down: Trajectory) -> Array:
 
 
 def _jump_quantities(up: Trajectory, down: Trajectory) -> dict[str, Estimate]:
-    """The delay; time and height of the highest peak, nan without one."""
+    """The delay; time and height of the highest peak, nan without one that surely is one."""
     t, y = up.time, odd_part(up, down)
     # Forces act in the middle of a step: times are known to half a finer step.
     late = coarse_step(up.header.parameters) / 4 / math.sqrt(12)
-    at, height = _highest(t, y)
+    at, top_of_all = _highest(t, y)
     _, seldom = _highest(t[::2], y[::2])
+    # What is left of the size of a jump is of its second order.
+    height = estimate(top_of_all, sampling=uniform(abs(seldom - top_of_all)), jump=JUMP**2)
+    peak = estimate(at, sampling=late)
+    if height.value - 1 <= COVERAGE * height.uncertainty:  # too low to be told from none
+        peak = height = estimate(math.nan)
     return {
         "jump_delay": estimate(float(np.trapezoid(1 - y, t)), sampling=late),
-        "jump_peak": estimate(at, sampling=late),
-        # What is left of the size of a jump is of its second order.
-        "jump_height": estimate(height, sampling=uniform(abs(seldom - height)), jump=JUMP**2),
+        "jump_peak": peak,
+        "jump_height": height,
     }
 
 
