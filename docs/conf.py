@@ -141,7 +141,8 @@ def page(package: ModuleType) -> None:
     title = package.__name__
     lines = [title, "=" * len(title), "", f".. automodule:: {title}", "   :no-members:"]
     for each in (getattr(package, name) for name in getattr(package, "__all__", ())):
-        summary = literal_bars(inspect.getdoc(each).split("\n")[0])
+        paragraph = inspect.getdoc(each).partition("\n\n")[0]
+        summary = literal_bars(paragraph.replace("\n", " "))
         lines += ["", f"* :py:obj:`~{each.__module__}.{each.__qualname__}`: {summary}"]
     modules = [
         each for each in pkgutil.iter_modules(package.__path__) if not each.name.startswith("_")
