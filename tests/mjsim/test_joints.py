@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import analytic
@@ -69,3 +70,27 @@ def test_a_ball_of_a_moment_of_inertia_just_beyond_the_least() -> None:
     """MuJoCo takes none below 1e-15 kg m²."""
     p = P.replace(m=8e-8, r=2e-4, R=0.01)
     assert mjsim.simulate(p, State(), 0.01).omega_c[-1] > 0
+
+
+def test_a_ball_that_stops_sliding_rolls_on_with_its_weight() -> None:
+    """Friction turns round in the step in which slip ends: there residuals of Newton's method hardly
+    fall along its step, and loads were wrong by a hundredth."""
+    p = P.replace(omega_0=22.6, mu=0.5)
+    x = State(omega_c=5.07, slip_x=24.6, slip_y=9.91, slip_z=-39.1)
+    run = mjsim.simulate(p, x, 0.06, settings=mjsim.RigidContacts(timestep=1e-3))
+    loads = run.force_A[run.case == Case.RN, 1]
+    assert loads[1:] == pytest.approx(p.m * p.g, rel=3e-5)
+    assert len(loads) > 20
+
+
+def test_floor_and_wall_share_the_weight_alike_at_all_orbits() -> None:
+    """Rolling at both, they can bear it in many ways; in any other case it is known."""
+    p = Parameters(m=0.04, r=0.01, R=0.055, j=0.35, mu=0.3, eta=0.8, g=7.0, c=3.0, omega_0=1.0)
+    orbits = np.linspace(10, 18, 15)
+    settings = mjsim.RigidContacts(timestep=1.25e-4)
+    loads = [
+        mjsim.simulate(p.replace(omega_0=w), State(omega_c=w), 1e-3, settings=settings).force_A[-1]
+        for w in orbits.tolist()
+    ]
+    line = np.polynomial.Polynomial.fit(orbits**2, np.array(loads)[:, 1], 1)
+    assert np.array(loads)[:, 1] == pytest.approx(line(orbits**2), abs=1e-4 * p.m * p.g)
