@@ -38,7 +38,7 @@ from .memory import (
     places_of,
     rows_of,
 )
-from .parameters import DECREASE, EXACT, FALLING, FEWER, FLAT, SEARCHES, SHORTEST, STEPS
+from .parameters import DECREASE, EXACT, FALLING, FEWER, SHORTEST, STEPS
 from .rows import times
 
 # -- forces and their derivatives ------------------------------------------------------------------
@@ -300,63 +300,21 @@ def solve_island(model: Any, data: Any, memory: Any, first: int, a: Any) -> bool
             step[dofs[i].place] = -residual[i]
             i = dofs[i].next
         substitute(matrix, dofs, step)
-        square = search(model, data, memory, first, a, square)
+        share, before = 1.0, square
+        while True:
+            i = first
+            while i >= 0:
+                tried[i] = a[i] + share * step[dofs[i].place]
+                i = dofs[i].next
+            square = find_residual(model, data, memory, first, tried)
+            if square <= (1 - DECREASE * share) ** 2 * before or share < SHORTEST:
+                break
+            share *= FEWER
         i = first
         while i >= 0:
             a[i] = tried[i]
             i = dofs[i].next
     return False
-
-
-@kernel
-def search(model: Any, data: Any, memory: Any, first: int, a: Any, before: float) -> float:
-    """Go along Newton's step, `tried`; the square of the residual there, which was `before`.
-
-    All of it or an eighth, if the residual falls; else to where that is across the step, as it is
-    where a convex function is least: the residual hardly falls where friction is about to turn.
-    """
-    low, high, share, slope = 0.0, 1.0, 1.0, slope_along(model, memory, first)
-    at_low, at_high, begin, square = slope, 0.0, slope, math.inf
-    while square >= (1 - DECREASE * share) ** 2 * before and share > SHORTEST:
-        share *= FEWER
-        square = go_along(model, data, memory, first, a, 2 * share)
-    if square < before:
-        return square
-    share = 1.0
-    for n in range(SEARCHES):
-        square = go_along(model, data, memory, first, a, share)
-        slope = slope_along(model, memory, first)
-        if abs(slope) <= FLAT * abs(begin):
-            break
-        if slope > 0:
-            high, at_high = share, slope
-        else:
-            low, at_low = share, slope
-        guess = at_low / (at_low - at_high) if at_low < at_high and n % 3 < 2 else 0.5
-        share = low + (high - low) * min(max(guess, 0.1), 0.9)
-    return square
-
-
-@kernel
-def go_along(model: Any, data: Any, memory: Any, first: int, a: Any, share: float) -> float:
-    """Try a share of the step; the square of the residual there."""
-    dofs, i = dofs_of(memory), first
-    step, tried = reals(memory.step_at, model.nv), reals(memory.tried_at, model.nv)
-    while i >= 0:
-        tried[i] = a[i] + share * step[dofs[i].place]
-        i = dofs[i].next
-    return float(find_residual(model, data, memory, first, tried))
-
-
-@kernel
-def slope_along(model: Any, memory: Any, first: int) -> float:
-    """The residual times the step."""
-    dofs, i, slope = dofs_of(memory), first, 0.0
-    step, residual = reals(memory.step_at, model.nv), reals(memory.residual_at, model.nv)
-    while i >= 0:
-        slope += residual[i] * step[dofs[i].place]
-        i = dofs[i].next
-    return slope
 
 
 @kernel
@@ -438,7 +396,8 @@ def solve_closed(
         if dofs[first].label == first and dofs[first].closes:
             gives_way, last, rounds = math.inf, math.inf, 0
             while rounds < memory.law.most and (gives_way > enough or gives_way < FALLING * last):
-                solved &= solve_island(model, data, memory, first, a)
+                if not solve_island(model, data, memory, first, a):
+                    return False
                 last, gives_way = gives_way, hold_forces(memory, first)
                 rounds += 1
             solved &= gives_way <= enough

@@ -83,11 +83,9 @@ STEPS = 40
 """Factorisations that Newton's method may take for an island."""
 EXACT = 1e-9
 """Part of the forces without contacts to which it solves."""
-FEWER, DECREASE, SHORTEST = 0.5, 1e-4, 0.01
+FEWER, DECREASE, SHORTEST = 0.5, 1e-4, 1e-3
 """By what a Newton step is shortened; by how much, relative to its length, the residual must fall;
-the shortest for which it may."""
-SEARCHES, FLAT = 30, 0.1
-"""Places along a Newton step that may be tried; part of its first slope that counts as none."""
+the shortest."""
 SOFTER = 30.0
 """How much larger R is in a step that Newton's method solves, which holds forces until contacts
 give way no more."""
