@@ -73,8 +73,8 @@ def test_a_ball_of_a_moment_of_inertia_just_beyond_the_least() -> None:
 
 
 def test_a_ball_that_stops_sliding_rolls_on_with_its_weight() -> None:
-    """Friction turns round in the step in which slip ends: there residuals of Newton's method hardly
-    fall along its step, and loads were wrong by a hundredth."""
+    """Friction turns round in the step in which slip ends: Newton's method comes to no end there,
+    and loads would be wrong by a hundredth."""
     p = P.replace(omega_0=22.6, mu=0.5)
     x = State(omega_c=5.07, slip_x=24.6, slip_y=9.91, slip_z=-39.1)
     run = mjsim.simulate(p, x, 0.06, settings=mjsim.RigidContacts(timestep=1e-3))
