@@ -356,7 +356,8 @@ def solve_contacts(model: Any, data: Any, memory: Any, a: Any, enough: float) ->
         contact, normal = contacts[k], rows[contacts[k].address]
         contact.state = STICKS if normal.residual < 0 or normal.held > 0 else OPEN
     for n in range(memory.law.most):
-        solved = solve_closed(model, data, memory, a, enough, n == 0)
+        if not solve_closed(model, data, memory, a, enough, n == 0):
+            return False
         find_residuals(memory, a)
         some = False
         for k in range(memory.contacts):
@@ -367,7 +368,7 @@ def solve_contacts(model: Any, data: Any, memory: Any, a: Any, enough: float) ->
             contact.extrapolated = -1.0
             some = some or contact.closes
         if not some:
-            return bool(solved)
+            return True
     return False
 
 
@@ -391,7 +392,7 @@ def solve_closed(
     """
     find_units(memory)
     find_islands(model, memory, everywhere)
-    dofs, solved = dofs_of(memory), True
+    dofs = dofs_of(memory)
     for first in range(model.nv):
         if dofs[first].label == first and dofs[first].closes:
             gives_way, last, rounds = math.inf, math.inf, 0
@@ -400,5 +401,6 @@ def solve_closed(
                     return False
                 last, gives_way = gives_way, hold_forces(memory, first)
                 rounds += 1
-            solved &= gives_way <= enough
-    return solved
+            if gives_way > enough:
+                return False
+    return True
