@@ -218,15 +218,21 @@ def copy_jacobians(model: Any, data: Any, memory: Any) -> None:
         for r in range(dim):
             rows[u + r].first = total
             for n in range(begin, begin + length):
-                some = False
-                for s in range(dim):
-                    some = some or given[n + s * length] != 0
-                if some:
+                if moves(given, n, dim, length):
                     jacobian[total] = given[n + r * length]
                     column[total] = columns[n] if sparse else n - begin
                     total += 1
             rows[u + r].length = total - rows[u + r].first
         u += dim
+
+
+@kernel
+def moves(given: Any, n: int, dim: int, length: int) -> bool:
+    """Whether one of `dim` rows, each of this length, moves the column of number n."""
+    some = False
+    for r in range(dim):
+        some = some or given[n + r * length] != 0
+    return some
 
 
 @kernel
@@ -241,8 +247,10 @@ def find_kinds(data: Any, memory: Any) -> None:
             row.kind = DRY if r < data.ne + data.nf else ONE_SIDED
     for i in range(data.ncon):
         first = found[i].efc_address
-        for r in range(first, first + found[i].dim if first >= 0 else first):
-            rows[r].kind, rows[r].dim = IDLE if r > first else ONE_SIDED, found[i].dim
+        if first >= 0:  # a contact beyond its margin has no rows
+            rows[first].dim = found[i].dim
+            for r in range(first + 1, first + found[i].dim):
+                rows[r].kind = IDLE
     for i in range(memory.contacts):
         for r in range(contacts[i].address, contacts[i].address + contacts[i].dim):
             rows[r].kind = CONTACT_ROW

@@ -100,7 +100,7 @@ DOF = np.dtype(
         ("label", _i4),  # the first one of its island
         ("next", _i4),  # the next one of its island; -1: it is the last
         ("unit", _i4),  # of the first one: the first unit of the island
-        ("closes", _i4),  # of the first one: whether a contact of the island has just closed
+        ("due", _i4),  # of the first one: whether the island is to be solved
         ("place", _i4),  # its number in its island
         ("envelope", _i4),  # where the row of that number begins in the derivative
         ("reach", _i4),  # where it ends in U

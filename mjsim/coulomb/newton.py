@@ -111,21 +111,21 @@ def find_units(memory: Any) -> None:
 def find_islands(model: Any, memory: Any, everywhere: bool) -> None:
     """Find the islands of degrees of freedom that units or joints connect.
 
-    Some contact closes in one of them if it just closes, or `everywhere`.
+    Those are due in which a contact has just closed; or all, `everywhere`.
     """
     rows, contacts, dofs = rows_of(memory), contacts_of(memory), dofs_of(memory)
     parent = integers(model.dof_parentid, model.nv)
     for i in range(model.nv):
         dofs[i].label = root(dofs, parent[i]) if parent[i] >= 0 else i
-        dofs[i].next, dofs[i].unit, dofs[i].closes = -1, -1, everywhere
+        dofs[i].next, dofs[i].unit, dofs[i].due = -1, -1, everywhere
     for u in range(len(rows)):
         rows[u].dof = -1
-        for c in columns_of(memory, rows[u]):
-            if rows[u].dim == 0:
-                break
-            rows[u].dof = c if rows[u].dof < 0 else rows[u].dof
-            one, other = root(dofs, rows[u].dof), root(dofs, c)
-            dofs[max(one, other)].label = min(one, other)
+        column = columns_of(memory, rows[u])
+        if rows[u].dim > 0 and len(column) > 0:
+            rows[u].dof = column[0]
+            for c in column:
+                one, other = root(dofs, column[0]), root(dofs, c)
+                dofs[max(one, other)].label = min(one, other)
     for i in range(model.nv - 1, -1, -1):
         first = root(dofs, i)
         dofs[i].label = first
@@ -136,7 +136,7 @@ def find_islands(model: Any, memory: Any, everywhere: bool) -> None:
             island = dofs[dofs[rows[u].dof].label]
             rows[u].next, island.unit = island.unit, u
             if rows[u].contact >= 0:
-                island.closes |= contacts[rows[u].contact].closes
+                island.due |= contacts[rows[u].contact].closes
 
 
 @kernel
@@ -153,8 +153,8 @@ def root(dofs: Any, i: int) -> int:
 
 @kernel
 def find_envelope(model: Any, memory: Any, first: int) -> int:
-    """Number an island's degrees of freedom; find where rows of its derivative begin, and how far
-    those of its upper triangle reach; its size."""
+    """Number an island's degrees of freedom, and find where rows of its derivative begin and how
+    far they reach; its size."""
     starts, columns = integers(model.M_rowadr, model.nv), integers(model.M_colind, model.nC)
     rows, dofs, i, size = rows_of(memory), dofs_of(memory), first, 0
     while i >= 0:
@@ -386,15 +386,13 @@ def find_residuals(memory: Any, a: Any) -> None:
 def solve_closed(
     model: Any, data: Any, memory: Any, a: Any, enough: float, everywhere: bool
 ) -> bool:
-    """Solve for the accelerations of islands of closed contacts: of all, or where one just closes.
-
-    Returns whether all came to an end.
-    """
+    """Solve for the accelerations of islands of closed contacts, `everywhere` or where one has just
+    closed; whether all came to an end."""
     find_units(memory)
     find_islands(model, memory, everywhere)
     dofs = dofs_of(memory)
     for first in range(model.nv):
-        if dofs[first].label == first and dofs[first].closes:
+        if dofs[first].label == first and dofs[first].due:
             gives_way, last, rounds = math.inf, math.inf, 0
             while rounds < memory.law.most and (gives_way > enough or gives_way < FALLING * last):
                 if not solve_island(model, data, memory, first, a):

@@ -196,9 +196,8 @@ def size_of_gravity(model: Any) -> float:
 def solve(model: Any, data: Any, memory: Any, enough: float, gravity: float, known: bool) -> None:
     """Solve the step, until contacts slip as predicted, to `enough`, m s-2.
 
-    Of rigid contacts Newton's method finds slip and forces; friction at mid step is known when they
-    slip, and asks for a solution more. Where it comes to no end, and of soft contacts, MuJoCo
-    solves for the slip that it found last.
+    Newton's method does so of rigid contacts. Where it comes to no end, and of soft contacts,
+    MuJoCo solves for the slip that it found last.
     """
     start = reals(data.qacc_warmstart, model.nv)
     mj_fwdActuation(memory.model, memory.data)
@@ -207,21 +206,27 @@ def solve(model: Any, data: Any, memory: Any, enough: float, gravity: float, kno
     solved = False
     if memory.law.rigid:
         if not known:  # loads that contacts can bear in many ways are shared as MuJoCo has it
-            share_softness(model, data, memory)
-            if data.nefc != memory.rows:
-                return
             iterate(model, data, memory, start, enough)
-        soften(memory)
-        solved = solve_contacts(model, data, memory, start, enough)
-        multiply(memory, start)
-        subtract_references(memory)
-        if oppose_slip_at_mid_step(model, data, memory, gravity):
-            solved &= solve_contacts(model, data, memory, start, enough)
-        if not solved:
-            share_softness(model, data, memory)
-    if not solved and data.nefc == memory.rows:
+        if data.nefc == memory.rows:
+            solved = solve_rigid(model, data, memory, start, enough, gravity)
+    if not solved:
         solved = iterate(model, data, memory, start, enough)
     memory.unsolved += not solved
+
+
+@kernel
+def solve_rigid(
+    model: Any, data: Any, memory: Any, start: Any, enough: float, gravity: float
+) -> bool:
+    """Find slip and forces by Newton's method; friction at mid step asks for a solution more, once
+    it is known what slips."""
+    soften(memory)
+    solved = solve_contacts(model, data, memory, start, enough)
+    multiply(memory, start)
+    subtract_references(memory)
+    if oppose_slip_at_mid_step(model, data, memory, gravity):
+        solved &= solve_contacts(model, data, memory, start, enough)
+    return bool(solved)
 
 
 @kernel
@@ -230,7 +235,9 @@ def iterate(model: Any, data: Any, memory: Any, start: Any, enough: float) -> bo
     hold the forces that were."""
     contacts, rows = contacts_of(memory), rows_of(memory)
     acceleration = reals(data.qacc, model.nv)
-    for _ in range(memory.law.most):
+    if memory.law.rigid:
+        share_softness(model, data, memory)
+    for _ in range(memory.law.most if data.nefc == memory.rows else 0):
         write_references(data, memory)
         mj_fwdConstraint(memory.model, memory.data)
         for i in range(model.nv):
