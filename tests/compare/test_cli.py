@@ -23,13 +23,19 @@ from tests.commands import ROOT, carried_out, parser_of, refused, told
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ("--omega-0 25", r"^At ω₀ = 25 rad/s the ball slips \(SS\).* up to ω₀ = 13\.562 rad/s"),
+        (
+            "--omega-0 25",
+            r"^At ω₀ = 25 rad/s the ball slips \(SS\).*with the fluid up to ω₀ = 13\.562 rad/s",
+        ),
         ("--omega-0 25", "^((?!fluid's torque on).)*$"),  # where no fluid is known
         ("--fluid-torque 0.0763", r"would be 11\.2 rad/s \(-6 %\) at the rate of 0\.0763 1/s"),
         ("--omega_0 25", r"the ball slips \(SS\)"),
         ("--set reference", "slip at both points"),
         ("--set high-wall-friction", "the wall can carry it"),
-        ("--set plastic-in-oil", "^Warning: the paper's model doesn't .*changes its numbers by"),
+        (
+            "--set plastic-in-oil",
+            "^Warning: the paper's model doesn't hold for this fluid.*changes its numbers by",
+        ),
         # by the fluid's torque
         ("--set plastic-in-oil", r"the rolling ball's ω_c would be [\d.]+ rad/s \(-\d+ %\)"),
         ("--set steel-in-water", "the fluid's inertia .*: it would shift ω₀₁ by "),

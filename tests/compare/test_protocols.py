@@ -94,10 +94,22 @@ def test_a_run_that_breaks_down_is_said_and_takes_no_other_with_it(runner, name,
     [
         (slipping.measure, P.replace(eta=0.0), slipping.FRICTIONLESS),
         (slipping.bounds, P.replace(eta=0.0), slipping.FRICTIONLESS),
-        (unsteady.pulsation, ROUGH, "no flow was measured at which two-point rolling ends by slip"),
-        (unsteady.jumps, ROUGH, "no flows were measured between which the ball slips at both"),
+        (
+            unsteady.pulsation,
+            ROUGH,
+            "no flow was measured at which two-point rolling ends by slipping",
+        ),
+        (
+            unsteady.jumps,
+            ROUGH,
+            "no flows were measured between which the ball slips at both points",
+        ),
         (thresholds.measure, P, "ends two-point rolling"),
-        (flowmeter.hysteresis, THICK, "no flow at which slipping on the floor gives way to riding"),
+        (
+            flowmeter.hysteresis,
+            THICK,
+            "no flow at which slipping on the floor gives way to riding the wall",
+        ),
     ],
 )
 def test_what_is_not_there_is_said(runner, measure, p, said):

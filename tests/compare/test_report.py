@@ -102,13 +102,20 @@ def row(text: str, name: str) -> str:
 @pytest.mark.parametrize(
     ("where", "said"),
     [
-        ("", "2 of 5 claims did not come out as expected: bad, broken; 1 of 5 claims can&#39;t be"),
+        (
+            "",
+            "2 of 5 claims did not come out as expected: bad, broken; 1 of 5 claims can&#39;t be "
+            "told",
+        ),
         ("", "Not drawn: The user&#39;s own: it was not measured"),
         ("", r"Not part of this run: <code[^>]*>deeper</code>"),
         ("good", "What good states of slip &amp; &lt;roll&gt;."),
         ("", "Out of sight, so that an error of theory there would go unnoticed"),
         ("good", "dualball validate --claim good --quick -o"),
-        ("good", r'title="time step 64 %, solver 36 %">1.0e-09<br><span class="soft">time step 64'),
+        (
+            "good",
+            r'title="time step 64 %, solver 36 %">1.0e-09<br><span class="soft">time step 64 %<',
+        ),
         ("bad", "Prop. bad, corrected. A sign."),
         ("bad", "Expected: confirmed."),
         ("broken", "ValueError: diverged &amp; &lt;so&gt; on"),
@@ -200,7 +207,7 @@ def test_verdicts_are_said_alike_in_the_terminal_on_the_page_and_in_the_summary(
         assert found == {"Largest deviation": said}
     bad = results.load(page.parent).verdicts["bad"]
     assert [bad[name] for name in ("id", "verdict", "expected")] == ["bad", "refuted", "confirmed"]
-    assert not bad["passed"]
+    assert bad["passed"] is False
     assert (bad["checks"], bad["agrees"]) == (len(VERDICTS[1].checks), 0)
     assert results.described(VERDICTS[1])["checks"][0]["conditions"]["y"] == 0.02
 
@@ -227,7 +234,11 @@ def test_a_figure_of_several_claims_is_drawn_once_or_is_a_gap(tmp_path, monkeypa
 @pytest.mark.parametrize(
     ("part", "other", "message"),
     [
-        ('version": 6', 'version": 4', "no summary that this program reads: .* another format"),
+        (
+            '"schema_version": 6',
+            '"schema_version": 4',
+            "holds no summary that this program reads: .* another format",
+        ),
         ('"dualball": "[^"]*"', '"dualball": "0.0.0"', "holds results of dualball 0.0.0"),
     ],
 )
