@@ -19,7 +19,7 @@ RESULTS ?= results
 # Bytecode is kept: else each process compiles all that it imports, for seconds, and checks start hundreds of them.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help validate mutants blind verdicts measured trial league test test-all benchmarks docs wheel check settled tried lint lock clean
+.PHONY: help validate mutants blind verdicts measured trial league test test-all benchmarks docs wheel check prepared tried lint lock clean
 
 validate: $(VENV)/installed
 	$(BIN)/dualball validate --quick
@@ -67,10 +67,10 @@ wheel:
 	.ci/wheel $(PYTHON)
 
 check:
-	$(MAKE) -j 2 wheel settled
+	$(MAKE) -j 2 wheel prepared
 	$(MAKE) -j 2 docs tried
 
-settled:  # measuring has a process for each processor, and compiles what the others then load
+prepared:  # measuring has a process for each processor, and compiles what the others then load
 	$(MAKE) -j 1 $(VENV)/installed-dev $(VENV)/installed-engines lint measured
 
 tried:
