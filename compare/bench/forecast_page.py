@@ -29,10 +29,10 @@ def _cures(f: Forecast) -> Iterator[str]:
         before, after, found = (
             _number(v, factor, endless) for v in (f.change.before, f.change.after, f.change.found)
         )
-        done = "" if found == "–" else f" Tried: {found} {unit}."
+        done = "" if found == "–" else f" Measured: {found} {unit}."
         yield (
-            f"Set {f.change.written}: the {name} of {f.change.pair} goes from {before} to "
-            f"{after} {unit}.{done}"
+            f"Set {f.change.written}: where {f.change.pair} touch, the {name} goes from "
+            f"{before} to {after} {unit}.{done}"
         )
     if f.remedy:
         yield (

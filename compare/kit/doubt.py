@@ -11,8 +11,8 @@ def model_warning(off: float) -> list[str]:
     if off <= real_fluid.LIMIT:
         return []
     return [
-        "Warning: the paper's model doesn't hold for this fluid. What it leaves out, above all the "
-        f"fluid's torque on the spinning ball, changes its numbers by up to {100 * off:.0f} %."
+        "Warning: the paper's model doesn't hold for this fluid: it is off by up to "
+        f"{100 * off:.0f} %. Above all, it leaves out the fluid's torque on the spinning ball."
     ]
 
 

@@ -22,6 +22,7 @@ from rich.progress import (
 )
 
 from compare.kit.workers import Spread
+from model.errors import few
 
 INTERVAL = 10.0
 """Seconds between plain lines."""
@@ -218,9 +219,14 @@ class ValidationProgress:
 
     def _tell(self) -> None:
         """Show how far claims and protocols are."""
-        runs = [f"{name} {done}/{total}" for name, (done, total, _) in self._under_way.items()]
-        what = f"{self._judged} of {self.claims} claims judged; measuring {', '.join(runs)}"
-        self._show(what, self.left(), sum(bad for *_, bad in self._under_way.values()))
+        runs = [
+            f"{name} {done}/{total}"
+            for name, (done, total, _) in self._under_way.items()
+            if done < total
+        ]
+        what = f"{self._judged} of {self.claims} claims judged"
+        measuring = f"; measuring {few(runs)}" if runs else ""
+        self._show(what + measuring, self.left(), sum(bad for *_, bad in self._under_way.values()))
 
     def _show(self, what: str, left: float, failed: int = 0) -> None:
         passed = time.monotonic() - self.began

@@ -53,7 +53,7 @@ def test_the_curve_is_the_stable_motions_and_its_jumps_are_the_thresholds(tmp_pa
         ("--set high-wall-friction", "Repeatability: one flow has one reading"),
         ("--set high-wall-friction", "reads right, too, but for the ball's fall"),
         ("--eta 0.02", "right again from ω₀ = 99.05 rad/s on"),  # without a fold
-        ("--set steel-in-water", "changes its numbers by up to 5"),
+        ("--set steel-in-water", "it is off by up to 5"),
         ("", "give nu_f and density_ratio to have their share"),
     ],
 )

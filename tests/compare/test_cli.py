@@ -34,7 +34,7 @@ from tests.commands import ROOT, carried_out, parser_of, refused, told
         ("--set high-wall-friction", "the wall can carry it"),
         (
             "--set plastic-in-oil",
-            "^Warning: the paper's model doesn't hold for this fluid.*changes its numbers by",
+            "^Warning: the paper's model doesn't hold for this fluid: it is off by up to",
         ),
         # by the fluid's torque
         ("--set plastic-in-oil", r"the rolling ball's ω_c would be [\d.]+ rad/s \(-\d+ %\)"),

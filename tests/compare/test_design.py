@@ -107,7 +107,7 @@ def test_the_best_meter_in_words(tmp_path, capsys, changes, code, said):
     found, shown, _ = carried_out(capsys, f"design {path}")
     assert found == code
     assert re.search(said, " ".join(shown.split()))
-    assert shown.startswith("Warning: the paper's model doesn't hold for this fluid.")
+    assert shown.startswith("Warning: the paper's model doesn't hold for this fluid: it is off by")
 
 
 FLUID, FLOW, BOUNDS = METER["fluid"], METER["flow"], METER["bounds"]

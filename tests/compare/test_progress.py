@@ -62,3 +62,16 @@ def test_silence_between_two_parts_is_no_sign_that_they_are_slow(monkeypatch):
     now += 9.0
     pace.note(4, 10)  # nothing new
     assert pace.left() == pytest.approx(100.0 - now)
+
+
+def test_what_is_shown_is_what_is_being_measured_on_a_short_line():
+    said = []
+    far = progress.ValidationProgress(lambda what, *_: said.append(what), 30)
+    for k in range(5):
+        far.measuring(f"protocol {k}", 1, 2, 0)
+    assert said[-1] == (
+        "0 of 30 claims judged; measuring protocol 0 1/2, protocol 1 1/2, protocol 2 1/2 and 2 more"
+    )
+    for k in range(5):
+        far.measuring(f"protocol {k}", 2, 2, 0)
+    assert said[-1] == "0 of 30 claims judged"

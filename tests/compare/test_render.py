@@ -318,6 +318,6 @@ def test_an_address_tells_a_setting():
 
 
 def test_explore_says_where_the_model_does_not_hold():
-    doubt = "Warning: the paper's model doesn't hold for this fluid."
+    doubt = "Warning: the paper's model doesn't hold for this fluid: it is off by"
     assert explore.in_words(Parameters.named("steel-in-water")).startswith(doubt)
     assert doubt not in explore.in_words(P)
