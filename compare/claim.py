@@ -15,11 +15,12 @@ from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
 from statistics import median
-from typing import Any
+from typing import Any, Unpack
 
+from compare.kit.conditions import Conditions
 from compare.kit.levels import Level, sets
 from compare.kit.quantities import quantity
-from compare.kit.record import Check, Condition, Measurement, Missing, Relation
+from compare.kit.record import Check, Measurement, Missing, Relation
 from compare.kit.statistics import Estimate
 
 When = Callable[[Measurement], bool]
@@ -49,9 +50,9 @@ class Text(StrEnum):
     """True once a listed erratum is corrected."""
 
 
-def given(**conditions: Condition) -> When:
+def given(**conditions: Unpack[Conditions]) -> When:
     """A filter of measurements: whether one was made under these conditions."""
-    return lambda m: conditions.items() <= m.conditions.items()
+    return lambda m: conditions.items() <= m.at.items()
 
 
 def all_of(*whens: When) -> When:

@@ -260,7 +260,7 @@ class Alike:
     def of(cls, check: Check) -> Alike:
         """What a check shares with those of the same thing with other steps."""
         m = check.measurement
-        texts = sorted((name, v) for name, v in m.conditions.items() if isinstance(v, str))
+        texts = sorted((name, v) for name, v in m.at.items() if isinstance(v, str))
         return cls(m.protocol, check.criterion, m.set, tuple(texts))
 
 
@@ -282,5 +282,5 @@ def _pair_nearest(ones: Sequence[Check], others: Sequence[Check]) -> Iterator[tu
 
 def _numbers_of(m: Measurement) -> dict[str, float]:
     """The numbers among conditions, and those of the parameters that protocols choose."""
-    numbers = {name: v for name, v in m.conditions.items() if not isinstance(v, str)}
+    numbers = {name: v for name, v in m.at.items() if isinstance(v, float)}
     return numbers | {name: getattr(m.parameters, name) for name in ("omega_0", "c", "mu", "eta")}

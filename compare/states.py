@@ -26,7 +26,7 @@ def case_of(m: Measurement) -> Case:
     """The case of the state that was measured; contacts that carry nothing count as none.
 
     SR is counted as NR, with an unloaded floor, and RN as RS, with an unloaded wall."""
-    case = physical_case(m.case())
+    case = physical_case(m.case)
     return Case.RS if case is Case.RN else case
 
 
@@ -69,4 +69,4 @@ def lifts_first(m: Measurement) -> bool:
 
 def from_floor(m: Measurement) -> bool:
     """Whether the ball started on the floor."""
-    return m.text("start") in ("rest", "with the fluid")
+    return m.at["start"] in ("rest", "with the fluid")

@@ -1,14 +1,15 @@
 """Measurements, motions and claims made up for tests."""
 
 import math
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 import numpy.typing as npt
 
 import analytic
 from compare.claim import Claim, Criterion
-from compare.kit.record import Condition, Measurement, Records
+from compare.kit.conditions import Conditions
+from compare.kit.record import Measurement, Records
 from model import Events, Flow, Header, Parameters, Trajectory
 from model.trajectory import SAMPLE
 
@@ -20,7 +21,7 @@ def measured(
     uncertainty: float = 0.0,
     p: Parameters | None = None,
     set: str = "reference",
-    **conditions: Condition,
+    **at: Unpack[Conditions],
 ) -> Measurement:
     """A measurement by MuJoCo, on the reference unless parameters are given."""
     return Measurement(
@@ -31,7 +32,7 @@ def measured(
         engine="mujoco",
         set=set,
         parameters=p or Parameters.named("reference"),
-        conditions=conditions,
+        at=at,
     )
 
 

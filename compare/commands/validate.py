@@ -204,7 +204,5 @@ def checks(verdict: Verdict) -> Table:
             *sizes,
             wording.mark(check),
         ]
-        rows.append(
-            [m.set, f"{m.parameters.omega_0:.6g}", *found, wording.conditions(m.conditions)]
-        )
+        rows.append([m.set, f"{m.parameters.omega_0:.6g}", *found, wording.conditions(m.at)])
     return pages.table(f"{verdict.claim.id}  {verdict.claim.statement}", rows, no_wrap=True)

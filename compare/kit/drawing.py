@@ -46,7 +46,7 @@ class Evidence:
         """Measurements of a quantity, by all engines, that have conditions so named."""
         named = set(conditions)
         measured = (*self.records.measurements, *self.others.measurements)
-        return (m for m in measured if m.quantity == quantity and named <= m.conditions.keys())
+        return (m for m in measured if m.quantity == quantity and named <= m.at.keys())
 
     def motions(self, m: Measurement) -> list[Motion]:
         """The runs of a measurement whose files are there."""

@@ -18,22 +18,21 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Unpack, cast
 
 import numpy as np
 
+from compare.kit.conditions import Conditions
 from compare.kit.quantities import quantity
 from compare.kit.runner import Runner
 from compare.kit.statistics import Estimate
 from compare.kit.tasks import Task
 from model import Case, Parameters, StorageError
-from model.arrays import Array
 from model.hdf5 import WholeFile, column, dataset, reading, write_columns
 from model.kinematics import VARIABLES
 from model.versions import current_commit, current_versions
 
 SCHEMA, SCHEMA_VERSION = "dualball-measurements", 1
-Condition = float | str
 ANEW = "remove it, and 'dualball validate' measures anew"
 
 
@@ -55,8 +54,8 @@ class Measurement:
     """Name of the parameter set."""
     parameters: Parameters
     """With the omega_0 at which it was measured."""
-    conditions: Mapping[str, Condition] = field(default_factory=dict)
-    """What else it depends on, by name; SI units."""
+    at: Conditions = field(default_factory=Conditions)
+    """What else it depends on."""
     runs: tuple[str, ...] = ()
     """Keys of its runs; where they are kept, FILE/KEY, relative to the results directory."""
 
@@ -66,17 +65,10 @@ class Measurement:
         for name in ("value", "uncertainty"):
             object.__setattr__(self, name, float(getattr(self, name)))
 
-    def at(self, name: str) -> float:
-        """The number that a condition has, by its name."""
-        return float(self.conditions[name])
-
-    def text(self, name: str) -> str:
-        """The text that a condition is, by its name."""
-        return str(self.conditions[name])
-
-    def case(self, name: str = "case") -> Case:
-        """The case that a condition names."""
-        return Case[self.text(name)]
+    @property
+    def case(self) -> Case:
+        """The case among its conditions."""
+        return Case[self.at["case"]]
 
     @property
     def unit(self) -> str:
@@ -97,7 +89,7 @@ def measurement(
     quantity: str,
     value: Estimate | float,
     tasks: Iterable[Task] = (),
-    **conditions: Condition,
+    **at: Unpack[Conditions],
 ) -> Measurement:
     """A measurement by the runner's engine; a plain number is exact."""
     sure = value if isinstance(value, Estimate) else Estimate(float(value), 0.0)
@@ -110,7 +102,7 @@ def measurement(
         engine=runner.engine.name,
         set=set,
         parameters=p,
-        conditions=conditions,
+        at=at,
         runs=tuple(task.key for task in tasks),
     )
 
@@ -120,14 +112,10 @@ def if_found(row: Measurement, why: str) -> Measurement | Missing:
     return row if row.finite else Missing(row.protocol, row.set, why)
 
 
-def state_of(x: Array) -> dict[str, float]:
-    """A state (8,), or without the last two (6,), as conditions."""
-    return dict(zip(VARIABLES, x.tolist(), strict=False))
-
-
 def state(m: Measurement) -> tuple[float, ...]:
     """The state (8) among the conditions of a measurement, zero where it isn't named."""
-    return tuple(float(m.conditions.get(name, 0.0)) for name in VARIABLES)
+    at = cast(Mapping[str, float], m.at)
+    return tuple(at.get(name, 0.0) for name in VARIABLES)
 
 
 class Relation(StrEnum):
@@ -295,9 +283,9 @@ def save(records: Records, path: Path, about: Mapping[str, Any]) -> None:
     columns |= {name: [getattr(m, name) for m in rows] for name in _OWN}
     columns["runs"] = [" ".join(m.runs) for m in rows]
     columns |= {name: [getattr(m.parameters, name) for m in rows] for name in _PARAMETERS}
-    texts = {name: isinstance(value, str) for m in rows for name, value in m.conditions.items()}
+    texts = {name: isinstance(value, str) for m in rows for name, value in m.at.items()}
     for name, text in texts.items():
-        values = [m.conditions.get(name, "" if text else np.nan) for m in rows]
+        values = [m.at.get(name, "" if text else np.nan) for m in rows]
         columns[f"at_{name}"] = values if text else np.array(values, float).tolist()
     for cause in dict.fromkeys(cause for m in rows for cause in m.budget):
         columns[f"u_{cause}"] = [float(m.budget.get(cause, math.nan)) for m in rows]
@@ -353,9 +341,7 @@ def load(path: Path, **origin: Any) -> Records:
         )
         rows = []
         for k in range(len(columns["value"])):
-            conditions = {
-                name[3:]: values[k] for name, values in columns.items() if name.startswith("at_")
-            }
+            at = {name[3:]: values[k] for name, values in columns.items() if name.startswith("at_")}
             row = Measurement(
                 **{name: columns[name][k] for name in _OWN if name != "unit"},
                 runs=tuple(columns["runs"][k].split()),
@@ -365,11 +351,7 @@ def load(path: Path, **origin: Any) -> Records:
                     if name.startswith("u_") and values[k] == values[k]
                 },
                 parameters=parameters(*(columns[name][k] for name in _PARAMETERS)),
-                conditions={
-                    name: value
-                    for name, value in conditions.items()
-                    if value != "" and value == value
-                },
+                at=cast(Conditions, {n: v for n, v in at.items() if v != "" and v == v}),
             )
             rows.append(row)
         planned = Counter[Planned]()

@@ -297,5 +297,5 @@ def physical_case(case: Case) -> Case:
 
 def settled_cases(records: Records, set: str, how: str) -> dict[float, Case]:
     """The cases to which a ball of a set settled from a start, by flow, rad s-1, slowest first."""
-    found = records.select("settled", "case", lambda m: m.set == set and m.text("start") == how)
+    found = records.select("settled", "case", lambda m: m.set == set and m.at["start"] == how)
     return dict(sorted((m.parameters.omega_0, physical_case(Case(int(m.value)))) for m in found))

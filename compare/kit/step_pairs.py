@@ -6,13 +6,14 @@ change, whose uncertainty is what the step and the degree change."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
-from compare.kit.record import Condition, Measurement, Missing, measurement
+from compare.kit.conditions import Conditions
+from compare.kit.record import Measurement, Missing, measurement
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.statistics import Estimate, uniform
@@ -48,7 +49,7 @@ class StepPair(Start):
     flow: Flow | None = None
     variants: tuple[Parameters, ...] = ()
     """Parameters of the runs that are read together; empty for one run with those of the start."""
-    conditions: Mapping[str, Condition] = field(default_factory=dict)
+    at: Conditions = field(default_factory=Conditions)
     """Of all measurements of this pair."""
     rows: int = 1
     """Measurements that are left out if a run breaks down."""
@@ -76,12 +77,12 @@ class StepPairResult:
         return self.reads[-1]
 
     def row(
-        self, runner: Runner, quantity: str, value: Estimate | float, **conditions: Condition
+        self, runner: Runner, quantity: str, value: Estimate | float, **at: Unpack[Conditions]
     ) -> Measurement:
         """A measurement of this pair."""
-        pair, conditions = self.pair, {**self.pair.conditions, **conditions}
+        pair, at = self.pair, self.pair.at | at
         return measurement(
-            runner, self.protocol, pair.set, pair.p, quantity, value, self.tasks, **conditions
+            runner, self.protocol, pair.set, pair.p, quantity, value, self.tasks, **at
         )
 
 

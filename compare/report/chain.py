@@ -114,7 +114,7 @@ def numbers(checks: list[Check]) -> Rows:
             f"{check.share:.2g}",
             *powers,
             wording.mark(check),
-            wording.conditions(m.conditions),
+            wording.conditions(m.at),
         ]
         rows.append([m.set, f"{m.parameters.omega_0:.6g}", *found])
     return rows

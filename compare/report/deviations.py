@@ -45,7 +45,7 @@ def sizes(checks: Iterable[Check]) -> dict[str, list[float]]:
         m = check.measurement
         size = COVERAGE * check.share
         if check.tolerance and check.relation is Relation.EQUAL and math.isfinite(size):
-            where = m.protocol, m.set, m.parameters.omega_0, tuple(sorted(m.conditions.items()))
+            where = m.protocol, m.set, m.parameters.omega_0, tuple(sorted(m.at.items()))
             found[m.quantity, m.value, where] = size
     by_quantity: dict[str, list[float]] = {}
     for (name, *_), size in found.items():

@@ -178,7 +178,7 @@ def columns(records: Records, checks: Mapping[str, Sequence[Check]]) -> dict[str
 
     # the same for a copy that another process has judged
     def identity(m: Measurement) -> tuple[Any, ...]:
-        conditions = tuple(sorted(m.conditions.items()))
+        conditions = tuple(sorted(m.at.items()))
         return m.protocol, m.quantity, m.engine, m.set, m.parameters.omega_0, m.value, conditions
 
     def rounded(m: Measurement, value: float) -> float | str:
@@ -197,7 +197,7 @@ def columns(records: Records, checks: Mapping[str, Sequence[Check]]) -> dict[str
         "quantity": [
             f"{wording.SYMBOLS[m.quantity]} {pages.readable(m.unit)}".rstrip() for _, m, _ in rows
         ],
-        "conditions": [wording.conditions(m.conditions) for _, m, _ in rows],
+        "conditions": [wording.conditions(m.at) for _, m, _ in rows],
         "engine": [m.engine for _, m, _ in rows],
         "measured": [rounded(m, m.value) for _, m, _ in rows],
         "uncertainty": [float(f"{m.uncertainty:.2g}") for _, m, _ in rows],

@@ -92,33 +92,13 @@ def described(verdict: Verdict) -> dict[str, Any]:
     texts = {
         name: getattr(claim, name) for name in ("section", "source", "statement", "text", "reason")
     }
-    of_measurement = (
-        "protocol",
-        "quantity",
-        "unit",
-        "engine",
-        "set",
-        "conditions",
-        "uncertainty",
-        "budget",
-        "runs",
-    )
-    numbers = (
-        "relation",
-        "predicted",
-        "deviation",
-        "tolerance",
-        "scale",
-        "resolution",
-        "agrees",
-        "conclusive",
-    )
+    of_measurement = "protocol quantity unit engine set uncertainty budget runs".split()
+    numbers = "relation predicted deviation tolerance scale resolution agrees conclusive".split()
     checks = []
     for check in verdict.checks:
         m = check.measurement
-        about = {name: getattr(m, name) for name in of_measurement} | {
-            name: getattr(check, name) for name in numbers
-        }
+        about = {name: getattr(m, name) for name in of_measurement}
+        about |= {name: getattr(check, name) for name in numbers} | {"conditions": m.at}
         checks.append(about | {"parameters": dataclasses.asdict(m.parameters), "measured": m.value})
     return _outcome(verdict) | texts | {"checks": plain(checks)}
 

@@ -9,18 +9,17 @@ from statistics import median
 from typing import Any
 
 from compare.claim import EngineVerdict, Outcome, Text, Verdict
+from compare.kit.conditions import UNITS, Conditions
 from compare.kit.engines import ENGINES
 from compare.kit.pages import readable
 from compare.kit.quantities import QUANTITIES, quantity
-from compare.kit.record import Check, Condition, Measurement
+from compare.kit.record import Check, Measurement
 from model import Case
 
 SYMBOLS = {name: each.symbol for name, each in QUANTITIES.items()} | {
     n: n for n in ("v_h", "n_x", "n_y", "n_z")
 }
 """How quantities and conditions are written, where that isn't their name."""
-_UNITS = {"h": "m", "v_h": "m s-1", "f": "Hz", "amplitude": "rad s-1", "rate": "rad s-2"}
-_UNITS |= {name: each.unit for name, each in QUANTITIES.items()}
 MARKS = {
     Outcome.CONFIRMED: ("pass", "✓"),
     Outcome.REFUTED: ("fail", "✗"),
@@ -48,7 +47,7 @@ def value(m: Measurement, of: float) -> str:
     return f"{of:.9g}" if abs(of) >= 1e-4 else size(of)
 
 
-def conditions(of: Mapping[str, Condition]) -> str:
+def conditions(of: Conditions) -> str:
     """Conditions as text: "case SS, from above, y = 0.02 m"; without states that are 0."""
     said = []
     for name, each in of.items():
@@ -56,7 +55,7 @@ def conditions(of: Mapping[str, Condition]) -> str:
         if isinstance(each, str):
             said.append(each if name == "side" else f"{plain} {each}")
         elif each or name not in ("y", "v_y", "h", "v_h", "slip_x", "slip_y", "slip_z"):
-            unit = readable(_UNITS.get(name, "1"))
+            unit = readable(UNITS.get(name, "1"))
             said.append(f"{SYMBOLS.get(name, plain)} = {each:.4g} {unit}".rstrip())
     return ", ".join(said)
 
@@ -64,7 +63,7 @@ def conditions(of: Mapping[str, Condition]) -> str:
 def where(m: Measurement) -> str:
     """The set, flow and conditions of a measurement: "reference, ω₀ = 25 rad/s: case SS"."""
     flow = f"{m.set}, ω₀ = {m.parameters.omega_0:.6g} rad/s"
-    return f"{flow}: {conditions(m.conditions)}" if m.conditions else flow
+    return f"{flow}: {conditions(m.at)}" if m.at else flow
 
 
 def budget(m: Measurement) -> str:

@@ -71,9 +71,9 @@ def rows(count, protocol="settled", name="omega_c", set="mine"):
 
 
 GONE = {
-    "one number kept": lambda m: m.at("n") == 0,
-    "every second": lambda m: m.at("n") % 2,
-    "one number": lambda m: m.at("n") != 1,
+    "one number kept": lambda m: m.at["n"] == 0,
+    "every second": lambda m: m.at["n"] % 2,
+    "one number": lambda m: m.at["n"] != 1,
     "one set": lambda m: m.set == "mine",
     "one criterion": lambda m: m.quantity == "omega_c",
     "another claim's": lambda m: m.quantity != "v_y",

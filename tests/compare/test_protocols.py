@@ -17,9 +17,10 @@ from compare.claim import Outcome
 from compare.judge import judge, select
 from compare.kit import levels, settling
 from compare.kit.brackets import FINER, LONGER, USUAL, Bracket, Search, narrow
+from compare.kit.conditions import state_of
 from compare.kit.levels import Level, sets
 from compare.kit.quantities import QUANTITIES
-from compare.kit.record import Missing, Records, state_of
+from compare.kit.record import Missing, Records
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.statistics import (
@@ -375,7 +376,7 @@ def test_a_state_that_depends_on_the_step_is_missing(runner, monkeypatch):
 def test_what_quadratic_drag_does_not_settle_has_no_values(runner, monkeypatch):
     """A ball that goes round with the fluid keeps a slight lag; one that slips or sinks settles."""
     found = measure_settled(runner, monkeypatch, QUICK["blunt"], 0.6, 2.0)
-    cases = {m.text("case") for m in found.measurements if m.quantity == "omega_c"}
+    cases = {m.at["case"] for m in found.measurements if m.quantity == "omega_c"}
     assert cases == {"SS", "NS"}
     assert any("quadratic drag fades with the lag" in each.reason for each in found.missing)
 

@@ -12,6 +12,7 @@ from typing import Any
 from unittest import mock
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
@@ -19,6 +20,7 @@ from compare import gallery
 from compare.claim import Claim, EngineVerdict, Outcome, Text, Verdict
 from compare.commands import validate
 from compare.commands.bench import LEAGUE_PAGE
+from compare.kit.conditions import Conditions, state_of
 from compare.kit.drawing import Drawing, Evidence, GapError
 from compare.kit.levels import Level
 from compare.kit.pages import typeset
@@ -145,7 +147,7 @@ def test_every_number_is_on_the_page():
     both = *checks(1), *checks(1, 0.5)
     m = dataclasses.replace(both[0].measurement, value=12.3456789, uncertainty=2.3e-4)
     alone = dataclasses.replace(
-        m, quantity="case", value=1.0, uncertainty=0.0, conditions={"start": "rest"}
+        m, quantity="case", value=1.0, uncertainty=0.0, at={"start": "rest"}
     )
     check, far = (dataclasses.replace(each, measurement=m) for each in both)
     again = dataclasses.replace(m)  # a copy, as another process returns it
@@ -358,6 +360,16 @@ def test_an_address_opens_its_row_nothing_runs_over_the_side_and_the_page_is_leg
     printed = tab.pdf()
     assert printed.startswith(b"%PDF")
     assert len(re.findall(rb"/Type ?/Page\b[^s]", printed)) > 1
+
+
+def test_conditions_are_said_with_their_units_and_a_state_without_what_is_zero():
+    at = Conditions(case="RS", side="from above", time=0.25, rate=-2.0, mode=2.0)
+    said = "case RS, from above, t = 0.25 s, rate = -2 rad/s², mode = 2"
+    state = state_of(np.array([0.0, 0.0, 12.5, 0.0, 0.0, 0.0, 0.02, 0.0]))
+    assert wording.conditions(at | state) == f"{said}, ω_c = 12.5 rad/s, h = 0.02 m"
+    assert wording.conditions(Conditions(nu_f=1e-6, rho_b=7850.0)) == (
+        "nu f = 1e-06 m²/s, rho b = 7850 kg/m³"
+    )
 
 
 @pytest.mark.parametrize(

@@ -26,12 +26,12 @@ _PERIODIC = "Section 5.3, last paragraph"
 
 def _hops(m: Measurement) -> float:
     """Whether theory's ball still hops after a run of the same length from the same state."""
-    return hops(simulated(m.parameters, state(m), m.at("duration"), 2000))
+    return hops(simulated(m.parameters, state(m), m.at["duration"], 2000))
 
 
 def _rebounding(m: Measurement) -> Orbit:
     """The hop of a ball that rebounds, by continuation from the hop without a rebound."""
-    p, end = m.parameters, m.at("restitution")
+    p, end = m.parameters, m.at["restitution"]
     orbit = theory(orbits.refine, p, TOP, 0.22)  # s, about its period
     for restitution in [*np.arange(0.2, end, 0.1).tolist(), end] if end else []:
         orbit = theory(orbits.refine, p, tuple(orbit.loop.x.tolist()), orbit.period, restitution)
@@ -65,7 +65,7 @@ def _orbit_criteria(protocol: str, *quantities: str) -> tuple[Criterion, ...]:
     """Criteria on quantities of the periodic orbit that theory has near the measured one."""
 
     def predict(m: Measurement) -> float:
-        return _of_orbit(m.quantity, theory(orbits.refine, m.parameters, state(m), m.at("period")))
+        return _of_orbit(m.quantity, theory(orbits.refine, m.parameters, state(m), m.at["period"]))
 
     return criteria(protocol, quantities, predict, by=_REFINED)
 

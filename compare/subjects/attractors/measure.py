@@ -19,14 +19,15 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from compare.kit.conditions import Conditions, state_of
 from compare.kit.engines import MOREAU
 from compare.kit.programme import Protocol
 from compare.kit.quantities import QUANTITIES
-from compare.kit.record import Measured, Missing, Records, Sets, if_found, measurement, state_of
+from compare.kit.record import Measured, Missing, Records, Sets, if_found, measurement
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.settling import settled_readings
@@ -155,12 +156,10 @@ class Hops(NamedTuple):
             for name, (mean, hops) in values.items()
         }
 
-    def conditions(self, p: Parameters) -> dict[str, Any]:
+    def conditions(self, p: Parameters) -> Conditions:
         """Conditions of a measurement: a state at a top, and the period, near a closed orbit."""
-        return {
-            **state_of(constrained(Case.NR, self.x[-1], p)),
-            "period": self.values["orbit_period"].value,
-        }
+        state = state_of(constrained(Case.NR, self.x[-1], p))
+        return state | Conditions(period=self.values["orbit_period"].value)
 
 
 def tops(run: Trajectory, start: float, end: float) -> Hops:
@@ -316,13 +315,12 @@ def swing(runner: Runner, sets: Sets, records: Records) -> Measured:
         return
     begun = (result.coarse, end), (result.fine, end), (result.fine, end - SWUNG)
     parts = [_swing(run, start) for run, start in begun]
-    conditions = {**state_of(constrained(Case.SS, result.fine.x[-1], p)), "period": parts[1][0]}
+    at = state_of(constrained(Case.SS, result.fine.x[-1], p)) | Conditions(period=parts[1][0])
     for name, coarse, fine, before in zip(
         ("swing_period", "swing_omega_c", "swing_size"), *parts, strict=True
     ):
-        yield result.row(
-            runner, name, of_no_step(coarse, estimate(fine, part=abs(fine - before))), **conditions
-        )
+        size = of_no_step(coarse, estimate(fine, part=abs(fine - before)))
+        yield result.row(runner, name, size, **at)
 
 
 def _swing(run: Trajectory, start: float) -> tuple[float, float, float]:
@@ -354,9 +352,10 @@ def calm(runner: Runner, sets: Sets, records: Records) -> Measured:
             # By chance samples may be the same: no state is known better than a settled one.
             least = QUANTITIES["omega_c"].resolution * task.parameters.omega_0
             end = estimate(last[-1], swing=max(float(np.ptp(last)), least))
-            at = {"case": settled_case(run).name}
-            p = task.parameters
-            yield measurement(runner, "calm", "strong drag", p, "end_omega_c", end, [task], **at)
+            p, case = task.parameters, settled_case(run).name
+            yield measurement(
+                runner, "calm", "strong drag", p, "end_omega_c", end, [task], case=case
+            )
 
 
 def _hops_at_end(runner: Runner, protocol: str, set: str, tasks: list[Task]) -> Measured:
@@ -365,7 +364,7 @@ def _hops_at_end(runner: Runner, protocol: str, set: str, tasks: list[Task]) -> 
         if isinstance(run, str):
             yield Missing(protocol, set, f"a run {run}")
         else:
-            at = state_of(State.of(task.x0).stacked())
+            at = Conditions(duration=task.t_end) | state_of(State.of(task.x0).stacked())
             yield measurement(
                 runner,
                 protocol,
@@ -375,7 +374,6 @@ def _hops_at_end(runner: Runner, protocol: str, set: str, tasks: list[Task]) -> 
                 hops(run),
                 [task],
                 **at,
-                duration=task.t_end,
             )
 
 

@@ -53,7 +53,7 @@ def _only_rolling(m: Measurement) -> float:
         return float(Case.RR)
     # The start that shows that the range has ended: the ball slips on the floor, or stays on the
     # wall.
-    ended = m.text("start") == ("rest" if slips_first(m) else "on the wall")
+    ended = m.at["start"] == ("rest" if slips_first(m) else "on the wall")
     if case_of(m) not in lasting_cases(m.parameters) - ({Case.RR} if ended else set()):
         raise LookupError("beyond the range, rolling is not the only motion that lasts")
     return m.value
@@ -71,7 +71,7 @@ def _reads_flow(m: Measurement) -> float:
 def _loop_case(m: Measurement) -> Case:
     """Case at a level of the loop: of the branch it comes from, or else of the other."""
     states = lasting_cases(m.parameters) - {Case.NS}
-    lifted = m.text("before") == Case.NR.name
+    lifted = m.at["before"] == Case.NR.name
     here = {case for case in states if (case is Case.NR) == lifted}
     if len(here or states) != 1:
         raise LookupError(f"no single state lasts at omega_0 = {m.parameters.omega_0:g}")
@@ -80,7 +80,7 @@ def _loop_case(m: Measurement) -> Case:
 
 def _jumps(way: int) -> When:
     """A filter of levels of the loop: the ball was lifted (1), came down (-1), or neither."""
-    return lambda m: (case_of(m) is Case.NR) - (m.text("before") == Case.NR.name) == way
+    return lambda m: (case_of(m) is Case.NR) - (m.at["before"] == Case.NR.name) == way
 
 
 def _loop_reading(m: Measurement) -> float:
@@ -96,7 +96,7 @@ def _does_not_sink(m: Measurement) -> bool:
 
 def _simulated(m: Measurement) -> Trajectory:
     """Theory's motion from the state that was measured."""
-    return simulated(m.parameters, state(m), m.at("duration"), 2000, rtol=RTOL)
+    return simulated(m.parameters, state(m), m.at["duration"], 2000, rtol=RTOL)
 
 
 def _end_case(m: Measurement) -> Case:
@@ -106,7 +106,7 @@ def _end_case(m: Measurement) -> Case:
 
 def _at_event(m: Measurement) -> Estimate:
     """A number at an event of theory's motion; LookupError if there is no such event."""
-    run, events, event, unsure = _simulated(m), _simulated(m).events, m.text("event"), 0.0
+    run, events, event, unsure = _simulated(m), _simulated(m).events, m.at["event"], 0.0
     changes = list(zip(map(Case, events.from_case), map(Case, events.to_case), strict=True))
     if m.quantity == "lift":
         top = Estimate(float(run.y[-1]), 0.0) if event == "end" else first_top(run)
@@ -185,7 +185,7 @@ def _by_sensitivity(m: Measurement) -> float:
 def _loop_reading_of_design(m: Measurement) -> float:
     """The reading of a rising or falling flow, from the design's characteristic curve."""
     low, high = design.readings(m.parameters, m.parameters.omega_0)
-    return float(low if m.text("side") == "up" else high)
+    return float(low if m.at["side"] == "up" else high)
 
 
 _ENDS_OF_RANGES = (("omega_01", slips_first), ("omega_02", lifts_first))

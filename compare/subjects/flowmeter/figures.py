@@ -33,7 +33,7 @@ def select_curves(evidence: Evidence) -> tuple[Diagram, ...]:
         for m in evidence.select("omega_c", "case")
         if m.protocol in ("settled", "hysteresis")
         and m.parameters.omega_0 > 0
-        and m.text("case") != "NS"
+        and m.at["case"] != "NS"
     ]
     curves = tuple(
         Diagram(figure, Parameters.named(name), tuple(m for m in settled if m.set == name))
@@ -98,7 +98,7 @@ def draw_figure_13(of: Diagram) -> tuple[Figure, str]:
         for side, (mark, text) in _WAYS.items():
             style.points(
                 axes,
-                [m for m in of.states if m.conditions.get("side") == side],
+                [m for m in of.states if m.at.get("side") == side],
                 way=text,
                 marker=mark,
             )
@@ -110,7 +110,7 @@ def draw_figure_13(of: Diagram) -> tuple[Figure, str]:
             "drops when the flow falls, see the figure of its fall."
         )
         axes.plot([t.omega_02], [t.omega_02], **style.POINT)
-        style.points(axes, [m for m in of.states if m.text("case") in ("RR", "SR", "NR")], ms=4)
+        style.points(axes, [m for m in of.states if m.at["case"] in ("RR", "SR", "NR")], ms=4)
     axes.set(xlim=(0, top), ylim=(0, 1.15 * top), ylabel=style.OMEGA_C, xlabel=style.OMEGA_0)
     style.legend(axes, loc="upper left")
     style.dimensionless(axes, p, style.FREE_0, style.FREE_C)
@@ -276,7 +276,7 @@ def draw_fall(of: Diagram) -> tuple[Figure, str]:
 
 def _loop(evidence: Evidence) -> Iterator[Measurement]:
     """Settled states of a flow that rises and falls in steps, and those on the edge."""
-    yield from (m for m in evidence.select("omega_c", "side") if m.text("side") in _WAYS)
+    yield from (m for m in evidence.select("omega_c", "side") if m.at["side"] in _WAYS)
     yield from evidence.select("edge_omega_c")
 
 
@@ -287,7 +287,7 @@ def _settled(evidence: Evidence) -> Iterator[Measurement]:
 
 def _falls(evidence: Evidence) -> Iterator[Measurement]:
     """What was measured of the fall that is kept."""
-    return evidence.records.select("unloading", where=lambda m: m.text("start") == "unloading")
+    return evidence.records.select("unloading", where=lambda m: m.at["start"] == "unloading")
 
 
 FIGURES = {"characteristic": Drawing("Characteristic curves", select_curves, draw_curves)} | {

@@ -19,15 +19,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
 from compare.kit import settling
+from compare.kit.conditions import Conditions, state_of
 from compare.kit.programme import Protocol
 from compare.kit.record import (
-    Condition,
     Measured,
     Measurement,
     Missing,
@@ -35,7 +34,6 @@ from compare.kit.record import (
     Sets,
     if_found,
     measurement,
-    state_of,
 )
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
@@ -67,8 +65,10 @@ def slope(runner: Runner, sets: Sets, records: Records) -> Measured:
             if failure := next((each.failure for each in states if each.failure), ""):
                 yield Missing("slope", curve.set, f"{where}: {failure}")
             elif value := _slope(curve, states):
-                tasks, at = [each.task for each in states], {"case": states[-1].case.name, "by": by}
-                row = measurement(runner, "slope", curve.set, curve.p, "slope", value, tasks, **at)
+                tasks, case = [each.task for each in states], states[-1].case.name
+                row = measurement(
+                    runner, "slope", curve.set, curve.p, "slope", value, tasks, case=case, by=by
+                )
                 yield if_found(row, f"{where}: no slope")
             else:
                 cases = ", ".join(each.case.name for each in states)
@@ -98,7 +98,7 @@ def _curves(name: str, p: Parameters, records: Records, most: int) -> Iterator[C
     states: dict[Case, dict[float, dict[str, Measurement]]] = {case: {} for case in Case}
     for m in records.select("settled", where=lambda m: m.set == name and m.quantity != "case"):
         if m.parameters.omega_0:
-            at = states[settling.physical_case(m.case())].setdefault(m.parameters.omega_0, {})
+            at = states[settling.physical_case(m.case)].setdefault(m.parameters.omega_0, {})
             at[m.quantity] = m
     for case in (Case.RR, Case.SS, Case.NR):
         alike = sorted(states[case].items())
@@ -207,12 +207,7 @@ def hysteresis(runner: Runner, sets: Sets, records: Records) -> Measured:
                 where = f"level {k + 1} ({level.name}, omega_0 = {level.p.omega_0:.4g} rad/s)"
                 yield Missing("hysteresis", name, f"{where}: {ended.failure}")
             else:
-                at: dict[str, Any] = {
-                    "case": ended.case.name,
-                    "side": level.name,
-                    "level": k + 1.0,
-                    "before": before,
-                }
+                at = Conditions(case=ended.case.name, side=level.name, level=k + 1.0, before=before)
                 row = partial(measurement, runner, "hysteresis", name, level.p, tasks=[task], **at)
                 omega_c = ended.values["omega_c"]
                 yield row(quantity="case", value=ended.case)
@@ -345,7 +340,7 @@ def _pair(runner: Runner, state: SteadyState, name: str) -> StepPair:
             numbers = {Shown(name, "lift", "end"): estimate(run.y[-1], sampling=uniform(late))}
         return settling.physical_case(settled_case(run)), numbers
 
-    known: dict[str, Condition] = {"start": name, **state_of(x0.stacked()), "duration": t_end}
+    at = Conditions(start=name, duration=t_end) | state_of(x0.stacked())
     samples = None if name == LANDING else 1000
     return StepPair(
         state.start.set,
@@ -356,7 +351,7 @@ def _pair(runner: Runner, state: SteadyState, name: str) -> StepPair:
         (coarse, fine),
         samples,
         read,
-        conditions=known,
+        at=at,
     )
 
 
@@ -404,6 +399,6 @@ def first_top(run: Trajectory) -> Estimate:
 
 PROTOCOLS = (
     Protocol("hysteresis", hysteresis, ("settled",)),
-    Protocol("unloading", unloading, ("thresholds",), drawn=lambda m: m.text("start") == UNLOADED),
+    Protocol("unloading", unloading, ("thresholds",), drawn=lambda m: m.at["start"] == UNLOADED),
     Protocol("slope", slope, ("settled", "thresholds")),
 )

@@ -18,7 +18,7 @@ from compare.kit.quantities import quantity
 from compare.kit.record import Measurement, state
 from compare.kit.settling import forces
 from compare.kit.statistics import Estimate
-from compare.subjects.motion.measure import FLUIDS, LANDED, late_ramp
+from compare.subjects.motion.measure import LANDED, late_ramp
 from model import Case, Trajectory
 from model.cases import TRAITS
 from model.drag import STOKES
@@ -37,7 +37,9 @@ _HOLDS = "analytic.slip_stability.stability"
 
 def _sinking(m: Measurement) -> float:
     """v_y in m/s by Stokes' drag, from the properties of fluid and ball."""
-    return -drag.sinking_speed(**{name: m.at(name) for name in FLUIDS[m.set]})
+    at = m.at
+    fluid = {"nu_f": at["nu_f"], "rho_f": at["rho_f"], "rho_b": at["rho_b"]}
+    return -drag.sinking_speed(**fluid, r=at["r"], gravity=at["gravity"])
 
 
 def _fallen(m: Measurement) -> Estimate:
@@ -45,15 +47,15 @@ def _fallen(m: Measurement) -> Estimate:
     p, (y, v_y, *_), within = m.parameters, state(m), 1e-12 * m.parameters.R
 
     def late(fall: float) -> float:
-        return drag.fall_time(fall, v_y, p) - m.at("time")
+        return drag.fall_time(fall, v_y, p) - m.at["time"]
 
     return Estimate(y - float(brentq(late, 1e-6 * p.R, 100 * p.R, xtol=within)), within)
 
 
 def _end_of_motion(m: Measurement) -> Estimate:
     """A state variable of theory's motion at the time at which the measured one ends."""
-    flow = late_ramp(m.parameters, m.at("rate"), m.at("time")) if "rate" in m.conditions else None
-    motion = simulated(m.parameters, state(m), m.at("time"), flow=flow)
+    flow = late_ramp(m.parameters, m.at["rate"], m.at["time"]) if "rate" in m.at else None
+    motion = simulated(m.parameters, state(m), m.at["time"], flow=flow)
     value = float(getattr(motion, m.quantity.split("_", 1)[1])[-1])
     return integrated(value, quantity(m.quantity).size(m.parameters))
 
@@ -62,7 +64,7 @@ def _end_states(*starts: str) -> tuple[Criterion, ...]:
     """Criteria on the state at the end of motions from starts whose names begin so."""
 
     def starts_so(m: Measurement) -> bool:
-        return m.text("start").startswith(starts)
+        return m.at["start"].startswith(starts)
 
     return criteria(
         "runs", [f"end_{name}" for name in VARIABLES], _end_of_motion, when=starts_so, by=_RUN
@@ -97,7 +99,7 @@ def _motion(m: Measurement, leave_rolling: str = "slip-stability") -> Trajectory
         analytic.simulate,
         m.parameters,
         state(m),
-        m.at("time"),
+        m.at["time"],
         leave_rolling=leave_rolling,
         rtol=RTOL,
     )
@@ -108,7 +110,7 @@ def _motion_either(m: Measurement) -> Trajectory:
 
     Where both agree with theory the internal force between floor and wall decides, which the state
     doesn't contain (docs/theory.md, 7)."""
-    case, leaves = m.case(), _motion(m)
+    case, leaves = m.case, _motion(m)
     if leaves.case[-1] == case:
         return leaves
     stays = _motion(m, "infeasible")
@@ -165,7 +167,7 @@ LAW_CLAIMS = (
             "runs",
             "end_y",
             _fallen,
-            when=lambda m: m.text("start") == "thrown" and m.parameters.drag == STOKES,
+            when=lambda m: m.at["start"] == "thrown" and m.parameters.drag == STOKES,
             by="analytic.mechanics.drag.fall_time",
         ),
         reason=_OWN,

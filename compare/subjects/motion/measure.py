@@ -38,8 +38,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from compare.kit.conditions import Conditions, FluidConditions, state_of
 from compare.kit.programme import Protocol
-from compare.kit.record import Condition, Measured, Missing, Records, Sets, measurement, state_of
+from compare.kit.record import Measured, Missing, Records, Sets, measurement
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.settling import PRESSES, settled_readings
@@ -68,7 +69,7 @@ from model.kinematics import SLIP_XYZ, TURNING, VARIABLES, slip_velocities, stat
 RUN_LENGTH = 768
 """Length of a run in coarse steps, which is about 40 sqrt(R/g), and its samples."""
 ROUNDING = 100 * float(np.finfo(float).eps)
-FLUIDS: Mapping[str, Mapping[str, float]] = {
+FLUIDS: Mapping[str, FluidConditions] = {
     "steel-in-water": {
         "nu_f": 1.004e-6,
         "rho_f": 998.2,
@@ -131,10 +132,10 @@ def laws(runner: Runner, sets: Sets, records: Records) -> Measured:
             # Halving the step may by chance change little: the larger change of the two contacts
             # counts.
             changes = [abs(fine[k] - coarse[k]) for k in fine if k[:2] == law[:2]]
-            change, at = float(np.nanmax(changes)), law._asdict()
-            sure = estimate(value, time_step=change, rounding=ROUNDING)
+            sure = estimate(value, time_step=float(np.nanmax(changes)), rounding=ROUNDING)
+            at = Conditions(law=law.law, contact=law.contact)
             yield measurement(
-                runner, "laws", name, p, at.pop("quantity"), sure, own[len(own) // 2 :], **at
+                runner, "laws", name, p, law.quantity, sure, own[len(own) // 2 :], **at
             )
     balls = {
         name: Parameters.from_fluid(**fluid, R=5 * fluid["r"], mu=0.2, eta=0.2)
@@ -295,7 +296,8 @@ def field(runner: Runner, sets: Sets, records: Records) -> Measured:
             kept[set, p.nu_f, case] += 1
             x, values = found
             for what, value in values.items():
-                yield result.row(runner, what, value, case=case.name, **state_of(x))
+                at = Conditions(case=case.name) | state_of(x)
+                yield result.row(runner, what, value, **at)
     for name, case in product(sets, Case):
         if lacking := runner.sampling.field_kept - kept[name, sets[name].nu_f, case]:
             why = (
@@ -441,11 +443,11 @@ def motions(runner: Runner, sets: Sets, records: Records) -> Measured:
             seen[name].add(case)
             x = constrained(Case(int(run.case[first])), run.x[first], p)
             time = float(run.time[last] - run.time[first])
-            at: dict[str, Condition] = {"case": case.name, "time": time, **state_of(x)}
+            at = Conditions(case=case.name, time=time) | state_of(x)
             yield measurement(runner, "motions", name, p, "case", case, [task], **at)
             rows = len(VARIABLES[TURNING])
             divisors = STEP_RATIO // 2, STEP_RATIO, 2 * STEP_RATIO
-            piece = StepPair(name, p, case.name, x, time, divisors, conditions=at, rows=rows)
+            piece = StepPair(name, p, case.name, x, time, divisors, at=at, rows=rows)
             again.append(piece)
     for result in carry_out(runner, "motions", again):
         yield from [result] if isinstance(result, Missing) else _turns_at_end(runner, result)
@@ -557,14 +559,14 @@ def impacts(runner: Runner, sets: Sets, records: Records) -> Measured:
         for how, state in LANDINGS.items():
             start = _start(name, p, 0.8, state, how)
             step = coarse_step(start.p) / STEP_RATIO
-            conditions: dict[str, Condition] = {"start": how, **state_of(start.x0)}
+            known = Conditions(start=how) | state_of(start.x0)
             t_end, divisors = round(0.4 * time_unit(p) / step) * step, (STEP_RATIO, 2 * STEP_RATIO)
             pairs.append(
                 StepPair(
                     **vars(start),
                     t_end=t_end,
                     divisors=divisors,
-                    conditions=conditions,
+                    at=known,
                     rows=len(LANDED),
                 )
             )
@@ -677,12 +679,12 @@ def _pairs(name: str, p: Parameters) -> Iterator[StepPair]:
         how: str, p: Parameters, x: State, lasts: float, rows: int = 1, rate: float | None = None
     ) -> StepPair:
         count = round(lasts * unit / coarse_step(p))
-        t_end, at = count * coarse_step(p), dict[str, Condition](start=how, **state_of(x.stacked()))
+        t_end, at = count * coarse_step(p), Conditions(start=how) | state_of(x.stacked())
         flow = None
         if rate is not None:
             flow, at = late_ramp(p, rate, t_end), at | {"rate": rate}
         return StepPair(
-            name, p, how, x.stacked(), t_end, (4, 8, 16), count, flow=flow, conditions=at, rows=rows
+            name, p, how, x.stacked(), t_end, (4, 8, 16), count, flow=flow, at=at, rows=rows
         )
 
     for how, (flow, lasts, x) in RUN_STARTS.items():

@@ -25,6 +25,7 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 from compare.kit.brackets import Attempt, Bracket, Search, narrow
+from compare.kit.conditions import Conditions
 from compare.kit.levels import Level
 from compare.kit.programme import Protocol
 from compare.kit.record import Measured, Missing, Records, Sets, if_found, measurement
@@ -208,7 +209,7 @@ def borders(runner: Runner, sets: Sets, records: Records) -> Measured:
             place = extrapolated_zero(np.array([edge.p.omega_0 for edge in near]), apart)
             tasks = [task for edge in near if edge.bracket for task in edge.bracket.tasks]
             p = sets[name].replace(omega_0=place.value)
-            at = {"side": "from above", "by": "unstable slipping meets the lifted ball"}
+            at = Conditions(side="from above", by="unstable slipping meets the lifted ball")
             row = measurement(runner, "edge", name, p, "omega_02", place, tasks, **at)
             yield if_found(row, "the edge points to no flow at which it meets the lifted ball")
         elif name == soonest or not at_quick:

@@ -30,31 +30,36 @@ def _state(m: Measurement) -> Array:
 
 def _arrow(m: Measurement) -> tuple[Case, Case]:
     """The case out of which, and into which, a ball slips or lifts off."""
-    return m.case("inner"), m.case("outer")
+    return Case[m.at["inner"]], Case[m.at["outer"]]
 
 
 def _along(arrow: tuple[Case, Case], *by: str) -> When:
     """True for slips along an arrow that were measured in one of some ways."""
-    return lambda m: _arrow(m) == arrow and m.conditions.get("by", "") in by
+    return lambda m: _arrow(m) == arrow and m.at.get("by", "") in by
+
+
+def _direction(m: Measurement) -> Array:
+    """The direction of a push (3,)."""
+    return np.array([m.at["n_x"], m.at["n_y"], m.at["n_z"]])
 
 
 def _gamma(m: Measurement) -> float:
     """gamma (53) along the measured direction of slip, rad s-2."""
-    n = [m.at(f"n_{name[-1]}") for name in slip_stability.normals(*_arrow(m))]
+    n = [_direction(m)["xyz".index(name[-1])] for name in slip_stability.normals(*_arrow(m))]
     return float(slip_stability.gamma(*_arrow(m), _state(m), np.array(n), m.parameters))
 
 
 def _following_case(m: Measurement) -> float:
     """The case that follows where a slip doesn't last."""
     x = _state(m)
-    x[SLIP_XYZ] += m.at("slip") * np.array([m.at(name) for name in ("n_x", "n_y", "n_z")])
-    return float(simulated(m.parameters, tuple(x.tolist()), m.at("time")).case[-1])
+    x[SLIP_XYZ] += m.at["slip"] * _direction(m)
+    return float(simulated(m.parameters, tuple(x.tolist()), m.at["time"]).case[-1])
 
 
 def _gamma_nr(m: Measurement) -> float:
     """gamma (56) in the measured direction of slip, rad s-2."""
     return float(
-        slip_bounds.gamma_nr(math.atan2(m.at("n_y"), m.at("n_z")), _state(m), m.parameters)
+        slip_bounds.gamma_nr(math.atan2(m.at["n_y"], m.at["n_z"]), _state(m), m.parameters)
     )
 
 
@@ -63,7 +68,7 @@ def _by_forces(m: Measurement) -> float:
     p = m.parameters
     _, (B_x, B_y, B_z) = analytic.contact_forces(Case.NR, _state(m), p)
     return float(
-        (1 + p.j) / (p.j * p.m * p.r) * (B_y * m.at("n_z") - B_z * m.at("n_y") - p.eta * B_x)
+        (1 + p.j) / (p.j * p.m * p.r) * (B_y * m.at["n_z"] - B_z * m.at["n_y"] - p.eta * B_x)
     )
 
 
@@ -119,7 +124,7 @@ def _neutral_flow(quantity: str, case: Case, by: str) -> Criterion:
 
 def _filippov_share(m: Measurement) -> float:
     """The weight delta in (69)."""
-    return slip_bounds.filippov_share(_arrow(m)[1], m.at("omega_c"), m.parameters)
+    return slip_bounds.filippov_share(_arrow(m)[1], m.at["omega_c"], m.parameters)
 
 
 def _case_on_wall(m: Measurement) -> float:
@@ -215,7 +220,7 @@ CLAIMS = (
         *_bounds(
             _RR_RS,
             "held",
-            lambda m: slip_bounds.rr_to_rs(m.parameters, m.at("omega_c"), round(m.at("n_y"))),
+            lambda m: slip_bounds.rr_to_rs(m.parameters, m.at["omega_c"], round(m.at["n_y"])),
         ),
         text=Text.CORRECTED,
         reason="(66) prints μ; it is the friction of the wall, η, that holds the wall's contact.",
@@ -240,7 +245,7 @@ CLAIMS = (
         *_bounds(
             _RR_SR,
             "held",
-            lambda m: slip_bounds.rr_to_sr(m.parameters, m.at("omega_c"), round(m.at("n_x"))),
+            lambda m: slip_bounds.rr_to_sr(m.parameters, m.at["omega_c"], round(m.at["n_x"])),
         ),
     ),
     claim(

@@ -23,10 +23,12 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Unpack
 
 import numpy as np
 
 from compare.kit import step_pairs
+from compare.kit.conditions import Conditions, state_of
 from compare.kit.programme import Protocol
 from compare.kit.record import (
     Measured,
@@ -36,7 +38,6 @@ from compare.kit.record import (
     Sets,
     if_found,
     measurement,
-    state_of,
 )
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import dragged_speed, slip_unit, time_unit
@@ -197,17 +198,14 @@ class Push:
         quantity: str,
         value: Estimate | float,
         tasks: Sequence[Task],
-        **at: float,
+        **at: Unpack[Conditions],
     ) -> Measurement:
         """A measurement of the push, with its state and direction as conditions."""
-        start, n = self.start, dict(zip(("n_x", "n_y", "n_z"), self.n.tolist(), strict=True))
-        along = (
-            {"inner": self.inner.name, "outer": self.outer.name, "by": start.name}
-            | state_of(start.x0)
-            | n
-        )
+        start, (n_x, n_y, n_z) = self.start, self.n.tolist()
+        cases = Conditions(inner=self.inner.name, outer=self.outer.name, by=start.name)
+        along = cases | state_of(start.x0) | Conditions(n_x=n_x, n_y=n_y, n_z=n_z)
         return measurement(
-            runner, protocol, start.set, start.p, quantity, value, tasks, **along, **at
+            runner, protocol, start.set, start.p, quantity, value, tasks, **(along | at)
         )
 
     def following_case(
@@ -223,8 +221,10 @@ class Push:
         ended = int(fine.case[-1])
         if ended == self.outer or any(np.any(run.case[-RECORD_SETTLED:] != ended) for run in runs):
             return None
-        at = {"slip": size * start_unit(self.start.p, self.start.x0), "time": float(fine.time[-1])}
-        return self.row(runner, protocol, "case", ended, tasks, **at)
+        slip = size * start_unit(self.start.p, self.start.x0)
+        return self.row(
+            runner, protocol, "case", ended, tasks, slip=slip, time=float(fine.time[-1])
+        )
 
 
 def growth(push: Push, runs: Sequence[Trajectory]) -> Estimate | None:
@@ -671,7 +671,7 @@ class Arrow:
     ) -> Measurement:
         """A measurement along the arrow, with the state at one orbit as conditions."""
         p, x0 = self.start(omega_c)
-        at = {"inner": self.inner.name, "outer": self.outer.name} | state_of(x0)
+        at = Conditions(inner=self.inner.name, outer=self.outer.name) | state_of(x0)
         return measurement(self.runner, "lift", self.set, p, quantity, value, tasks, **at)
 
 

@@ -23,7 +23,7 @@ _LEANING = "analytic.leaning_modes"
 
 def _stationary(m: Measurement) -> StationarySolution:
     """The stationary state of a case, SR also unstable; LookupError without one."""
-    p, case = m.parameters, m.case()
+    p, case = m.parameters, m.case
     found = theory(analytic.stationary_solutions, p)
     those = [s for s in found if s.exists and s.case is case and (s.stable or case is Case.SR)]
     if len(those) != 1:
@@ -47,7 +47,7 @@ def _mode(m: Measurement) -> complex:
     values = _spectrum(m)
     real = 1e-9 * max(map(abs, values))  # round-off in the imaginary part of one that is real
     upper = sorted((v.imag if v.imag > real else 0.0, -v.real) for v in values if v.imag >= -real)
-    if not (mode := round(m.at("mode"))) <= len(upper):
+    if not (mode := round(m.at["mode"])) <= len(upper):
         raise LookupError(f"theory has {len(upper)} modes")
     frequency, decay = upper[mode - 1]
     return complex(-decay, frequency)
@@ -62,9 +62,9 @@ def _mode_size(m: Measurement) -> float:
 
 def _response(m: Measurement) -> float:
     """How a linear motion follows a push, in natural units; of SR by its leaning modes."""
-    p, case, time = m.parameters, (stationary := _stationary(m)).case, m.at("time")
+    p, case, time = m.parameters, (stationary := _stationary(m)).case, m.at["time"]
     names = TRAITS[case].active
-    i, j = (names.index(m.text(name)) for name in ("of", "pushed"))
+    i, j = names.index(m.at["of"]), names.index(m.at["pushed"])
     if case is Case.SR:
         values, rows = theory(analytic.leaning_modes, p)
         moved = (rows.T * np.exp(values * time)) @ np.linalg.inv(rows.T)

@@ -17,15 +17,16 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from compare.kit.conditions import Conditions, state_of
 from compare.kit.engines import STUDY_SLIP
 from compare.kit.programme import Protocol
 from compare.kit.quantities import quantity
-from compare.kit.record import Measured, Measurement, Missing, Records, Sets, measurement, state_of
+from compare.kit.record import Measured, Measurement, Missing, Records, Sets, measurement
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.settling import SOLVED, SPIN, physical_case, safe_height
@@ -100,7 +101,7 @@ def measure(runner: Runner, sets: Sets, records: Records) -> Measured:
             yield state.missing("pushed, the ball doesn't stay in this case")
             continue
         (_, step), start = state.steps(runner), state.start
-        at: dict[str, Any] = {"case": state.case.name, **state_of(start.x0)}
+        at = Conditions(case=state.case.name) | state_of(start.x0)
         row = partial(measurement, runner, PROTOCOL, start.set, start.p, tasks=own[-count:], **at)
         modes = spectrum(state, answers, step)
         yield from _modes(state, modes, step, row)
@@ -222,7 +223,7 @@ def chosen_states(
     yield Pushed(Start(name, p.replace(omega_0=0.0), "spinning", spinning), Case.RS)
     values: dict[tuple[Parameters, Case], dict[str, float]] = {}
     for m in records.select("settled", where=lambda m: m.set == name and m.quantity in VARIABLES):
-        values.setdefault((m.parameters, physical_case(m.case())), {})[m.quantity] = m.value
+        values.setdefault((m.parameters, physical_case(m.case)), {})[m.quantity] = m.value
     states = []
     # on the wall alone it is high up, and just touching the floor
     for (q, case), value in values.items():

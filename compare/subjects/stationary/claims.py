@@ -36,7 +36,7 @@ def case(m: Measurement) -> float:
     From the floor it may settle to whatever attracts. High up on the wall it stays where the wall
     carries it, and sinks where not."""
     allowed = lasting_cases(m.parameters)
-    if m.text("start") == "on the wall":
+    if m.at["start"] == "on the wall":
         if case_of(m) is Case.NS and _exists(Case.NR, m):
             raise LookupError("NR exists, and yet the ball sinks")
         allowed &= {Case.NR} if Case.NR in allowed else {Case.NS}
@@ -185,7 +185,7 @@ _STATE = (*MOTION, *FORCES)
 
 def _crossed(m: Measurement) -> bool:
     """Whether a threshold is that at which the ball settles in another case."""
-    return m.text("by") != "floor force of settled slipping → 0"
+    return m.at["by"] != "floor force of settled slipping → 0"
 
 
 _DOUBLE = "analytic.bifurcation.diagram.double_points"

@@ -14,6 +14,7 @@ from typing import Self
 import numpy as np
 
 from compare.kit import settling
+from compare.kit.conditions import Conditions
 from compare.kit.programme import Protocol
 from compare.kit.quantities import quantity
 from compare.kit.record import Measured, Measurement, Missing, Records, Sets, measurement
@@ -154,7 +155,7 @@ def _row(
     runner: Runner, each: SteadyState, name: str, value: Estimate | float, protocol: str = PROTOCOL
 ) -> Measurement:
     """The measurement of a quantity, by its name, of a settled state."""
-    start, at = each.start, {"case": each.case.name, "start": each.start.name}
+    start, at = each.start, Conditions(case=each.case.name, start=each.start.name)
     return measurement(runner, protocol, start.set, start.p, name, value, [each.task], **at)
 
 

@@ -24,7 +24,7 @@ SLIPPING = "floor force of settled slipping → 0"
 
 
 def _threshold(
-    quantity: str, when: When = lambda m: m.text("by") != SLIPPING, protocol: str = "thresholds"
+    quantity: str, when: When = lambda m: m.at["by"] != SLIPPING, protocol: str = "thresholds"
 ) -> Criterion:
     """A criterion on a threshold, which `analytic.thresholds` predicts."""
     by = f"{_BY}: {quantity}"

@@ -286,7 +286,7 @@ def _draw_branches(
 def _spins(cases: tuple[str, ...], evidence: Evidence) -> list[Measurement]:
     """Measured spins on the wall in some cases."""
     measured = [*evidence.select("wall_spin", "case"), *evidence.select("edge_wall_spin", "case")]
-    return [m for m in measured if m.text("case") in cases]
+    return [m for m in measured if m.at["case"] in cases]
 
 
 def _select_released(_: Evidence) -> Diagram:

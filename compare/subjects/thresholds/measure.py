@@ -20,11 +20,13 @@ from dataclasses import dataclass, field, replace
 from enum import Enum, StrEnum, auto
 from functools import partial
 from itertools import pairwise
+from typing import Unpack
 
 import numpy as np
 
 from compare.kit import settling
 from compare.kit.brackets import Answer, Attempt, Bracket, Search, narrow
+from compare.kit.conditions import Conditions
 from compare.kit.engines import sliding_speeds
 from compare.kit.programme import Protocol
 from compare.kit.record import Measured, Measurement, Missing, Records, Sets, measurement
@@ -267,7 +269,11 @@ class Findings:
         return Missing("thresholds", self.set, why, rows)
 
     def row(
-        self, quantity: str, at: Estimate | float | None, tasks: Sequence[Task], **how: str
+        self,
+        quantity: str,
+        at: Estimate | float | None,
+        tasks: Sequence[Task],
+        **how: Unpack[Conditions],
     ) -> Measurement | Missing:
         """The measurement of a threshold, or of a number; or why it wasn't found."""
         if at is None:

@@ -23,9 +23,9 @@ _RATE = f"{_BY}.response.rolling_rate"
 def _followed(m: Measurement) -> tuple[Estimate, Estimate]:
     """Gain and phase lag, rad, of omega_c in a pulsation, while the ball rolls."""
     if m.parameters.drag == STOKES:
-        ratio, left_out = complex(theory(response.transfer, m.parameters, Case.RR, m.at("f"))), 0.0
+        ratio, left_out = complex(theory(response.transfer, m.parameters, Case.RR, m.at["f"])), 0.0
     else:
-        ratio = theory(pulsation.first_harmonic, m.parameters, m.at("amplitude"), m.at("f"))
+        ratio = theory(pulsation.first_harmonic, m.parameters, m.at["amplitude"], m.at["f"])
         left_out = pulsation.LEFT_OUT
     gain = abs(ratio)
     return Estimate(gain, left_out), Estimate(-cmath.phase(ratio), left_out / gain)
@@ -35,7 +35,7 @@ def _onset_criterion(rule: str, relation: Relation) -> Criterion:
     """A criterion on the onset of slip, by a rule of `Settings.leave_rolling`."""
 
     def onset(m: Measurement) -> float:
-        return theory(pulsation.slip_onset, m.parameters, m.at("f"), rule)
+        return theory(pulsation.slip_onset, m.parameters, m.at["f"], rule)
 
     by = f"{_BY}.pulsation.slip_onset, {rule}"
     return Criterion("pulsation", "slip_amplitude", onset, relation=relation, by=by)
@@ -43,7 +43,7 @@ def _onset_criterion(rule: str, relation: Relation) -> Criterion:
 
 def _ramp_end(m: Measurement) -> Estimate:
     """The flow at which a ramp ends slipping by theory; LookupError if it doesn't."""
-    p, rate = m.parameters, m.at("rate")
+    p, rate = m.parameters, m.at["rate"]
     # The ramp goes on three times as far beyond the fold as a slow one overshoots it.
     beyond = analytic.thresholds(p).omega_04 + 3.0 * response.ramp_coefficient(p) * rate ** (2 / 3)
     t_end = (beyond - p.omega_0) / rate
@@ -65,7 +65,7 @@ _MEAN = f"{_BY}.pulsation.mean_error"
 
 def _mean_error(m: Measurement) -> Estimate:
     """The mean of omega_c in a pulsation less that of the flow, rad s-1."""
-    value = theory(pulsation.mean_error, m.parameters, m.at("amplitude"), m.at("f"))
+    value = theory(pulsation.mean_error, m.parameters, m.at["amplitude"], m.at["f"])
     return Estimate(value, pulsation.SETTLED * abs(m.parameters.omega_0))
 
 
@@ -135,8 +135,8 @@ CLAIMS = (
             "bounds",
             "gamma_zero",
             lambda m: (
-                m.at("omega_c")
-                + pulsation.fast_onset(m.parameters.replace(omega_0=m.at("omega_c")))
+                m.at["omega_c"]
+                + pulsation.fast_onset(m.parameters.replace(omega_0=m.at["omega_c"]))
             ),
             when=given(inner="RR", outer="RS", by="held"),
             by=f"{_BY}.pulsation.fast_onset",
@@ -156,7 +156,7 @@ CLAIMS = (
             "pulsation",
             "mean_error",
             lambda m: 0.0,
-            when=lambda m: m.text("slips") == _ONE and m.parameters.drag == STOKES,
+            when=lambda m: m.at["slips"] == _ONE and m.parameters.drag == STOKES,
             size=_flow,
             by="the balance of spin, docs/theory.md, 11",
         ),

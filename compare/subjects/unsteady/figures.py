@@ -88,7 +88,7 @@ def draw_pulsation(of: Diagram) -> tuple[Figure, str]:
     for quantity, axes in panels.items():
         unit = 180 / math.pi if axes is phase else 1.0
         measured = [m for m in of.states if m.quantity == quantity]
-        style.points(axes, measured, lambda m: m.at("f"), unit=unit)
+        style.points(axes, measured, lambda m: m.at["f"], unit=unit)
     gain.set(xscale="log", yscale="log", ylabel="gain, amplitude of $\\omega_c$ / of $\\omega_0$")
     phase.set(ylabel="phase lag (°)", xlabel="frequency (Hz)")
     onset.set(yscale="log", ylabel="amplitude at which\nslip begins (rad/s)")
@@ -179,7 +179,7 @@ def draw_unsteady(of: Diagram) -> tuple[Figure, str]:
         label="slow ramps",
     )
     law.plot(rates, passed, color=style.COLOURS[Case.SS], lw=2, label="simulated")
-    style.points(law, measured, lambda m: m.at("rate"), lambda m: m.value - fold)
+    style.points(law, measured, lambda m: m.at["rate"], lambda m: m.value - fold)
     law.set(xlabel="rate ρ of the ramp (rad/s²)", ylabel="flow beyond $\\omega_{04}$ (rad/s)")
     for axis in (law.xaxis, law.yaxis):
         axis.set_major_locator(LogLocator(subs=(1, 2, 5)))

@@ -18,17 +18,17 @@ import cmath
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import NamedTuple, Unpack
 
 import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import Polynomial
 
 from compare.kit.brackets import Attempt, Bracket, Search, narrow
+from compare.kit.conditions import Conditions, state_of
 from compare.kit.programme import Protocol
 from compare.kit.quantities import QUANTITIES
 from compare.kit.record import (
-    Condition,
     Measured,
     Measurement,
     Missing,
@@ -36,7 +36,6 @@ from compare.kit.record import (
     Sets,
     if_found,
     measurement,
-    state_of,
 )
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.settling import rounded_duration, settle
@@ -188,12 +187,16 @@ class Pulsation:
         )
 
     def row(
-        self, runner: Runner, quantity: str, value: Estimate, tasks: Sequence[Task], **at: Condition
+        self,
+        runner: Runner,
+        quantity: str,
+        value: Estimate,
+        tasks: Sequence[Task],
+        **at: Unpack[Conditions],
     ) -> Measurement:
         """A measurement in this pulsation."""
-        return measurement(
-            runner, "pulsation", self.set, self.p, quantity, value, tasks, f=self.frequency, **at
-        )
+        at = Conditions(f=self.frequency) | at
+        return measurement(runner, "pulsation", self.set, self.p, quantity, value, tasks, **at)
 
 
 def _onset(runner: Runner, each: Pulsation, bracket: Bracket) -> Measurement | Missing:
@@ -435,10 +438,8 @@ def jumps(runner: Runner, sets: Sets, records: Records) -> Measured:
         elif math.isfinite(coarse) and math.isfinite(fine):
             yield result.row(runner, "ramp_end", of_no_step(coarse, estimate(fine)))
         else:
-            why = (
-                f"a ramp of {pair.conditions['rate']:.3g} rad/s^2 doesn't end slipping at both "
-                "points"
-            )
+            rise = f"{pair.at['rate']:.3g} rad/s^2"
+            why = f"a ramp of {rise} doesn't end slipping at both points"
             yield Missing("unsteady", pair.set, why)
 
 
@@ -448,7 +449,7 @@ def _jump(runner: Runner, start: Start, size: float) -> StepPair:
     sides = tuple(p.replace(omega_0=p.omega_0 + side * size) for side in (1, -1))
     # drag may be weak, and peaks come soon
     samples = max(4000, round(t_end / (4 * coarse_step(p))))
-    divisors, at = runner.sampling.unsteady_divisors, {"case": start.name}
+    divisors, at = runner.sampling.unsteady_divisors, Conditions(case=start.name)
     return StepPair(
         start.set,
         p,
@@ -470,7 +471,7 @@ def _ramps(runner: Runner, start: Start, begins: float, ends: float) -> Iterator
     last = begins + RAMP[1] * span
     for rate in runner.sampling.unsteady_rates:
         rise = rate * p.c * span
-        t_end, at = (last - p.omega_0) / rise, {"rate": rise, **state_of(start.x0[:6])}
+        t_end, at = (last - p.omega_0) / rise, Conditions(rate=rise) | state_of(start.x0[:6])
         flow, divisors = Flow.ramp(p.omega_0, last, t_end), runner.sampling.unsteady_ramps
         yield StepPair(
             start.set, p, "ramp", start.x0, t_end, divisors, 16000, caught_up, flow, (), at
