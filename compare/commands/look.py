@@ -99,9 +99,7 @@ def render(args: argparse.Namespace) -> int:
 
     asked = {name: getattr(args, name) for name in ("at", "time", "speed", "rate")}
     asked = {name: value for name, value in asked.items() if value is not None}
-    force, slip = args.arrows
-    run = storage.load(args.file)
-    print(page.save(run, args.output, **asked, force_arrow=force, slip_arrow=slip))
+    print(page.save(storage.load(args.file), args.output, **asked))
     return 0
 
 

@@ -14,7 +14,7 @@ from compare.commands import options
 from compare.commands.options import DATA, MAP, MARKDOWN, PAGE, TABLE, Number, Parser
 from model import InputError, Parameters, drag
 from model.errors import suggestion
-from model.parameters import NOT_NEGATIVE, POSITIVE, Range
+from model.parameters import POSITIVE, Range
 
 
 class Command(NamedTuple):
@@ -342,11 +342,6 @@ def render(parser: Parser) -> None:
     parser.add_argument("--speed", type=options.speed, help="default: 0.25; 1 is real time")
     rates = Number(allowed=Range(1, 1000, whole=True))
     parser.add_argument("--rate", type=rates, help="frames a second (default: 60)")
-    radii, names = Number("radii", NOT_NEGATIVE), ("FORCE", "SLIP")
-    lengths = "lengths of the arrows of a force m g and of the fastest slip (default 3 3)"
-    parser.add_argument(
-        "--arrows", nargs=2, type=radii, default=(3.0, 3.0), metavar=names, help=lengths
-    )
 
 
 @command("the ball", "look.explore", "--set hopping --port 8081")

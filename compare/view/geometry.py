@@ -18,8 +18,7 @@ from model.trajectory import columns
 STEP = 5e-3
 """Longest time between points of the rotation, s."""
 ARROW = 3.0
-"""Length of the arrows of a force m g and of the fastest slip of the run, in radii of the ball,
-unless said."""
+"""Length of the arrows of a force m g and of the fastest slip of the run, in radii of the ball."""
 
 
 @dataclass(frozen=True)
@@ -38,11 +37,8 @@ class Geometry:
     """Velocities in the tangent plane, as arrows, m; none without a force."""
 
 
-def geometry(
-    run: Trajectory, now: Trajectory, force_arrow: float = ARROW, slip_arrow: float = ARROW
-) -> Geometry:
-    """Positions of ball, contacts and arrows at the samples of `now`, which is `run` resampled; see
-    `ARROW`."""
+def geometry(run: Trajectory, now: Trajectory) -> Geometry:
+    """Positions of ball, contacts and arrows at the samples of `now`, which is `run` resampled."""
     p = run.header.parameters
     steps = max(1, math.ceil((now.time[-1] - run.time[0]) / STEP))
     past = resampled(run, np.linspace(run.time[0], now.time[-1], steps + 1))
@@ -55,13 +51,13 @@ def geometry(
     slips -= np.sum(slips * normals, axis=-1, keepdims=True) * normals
     fastest = max(float(np.abs(v).max()) for v in slip_velocities(run.x, p))
     slips *= np.any(forces, axis=-1, keepdims=True) * (
-        slip_arrow * p.r / fastest if fastest > 0 else 0.0
+        ARROW * p.r / fastest if fastest > 0 else 0.0
     )
     return Geometry(
         turns=orientations(past)[np.searchsorted(past.time, now.time).clip(max=steps)],
         centres=centres,
         contacts=centres - p.r * normals,
-        forces=forces * (force_arrow * p.r / (p.m * p.g)),
+        forces=forces * (ARROW * p.r / (p.m * p.g)),
         slips=slips,
     )
 

@@ -18,7 +18,7 @@ from compare.view.geometry import geometry, resampled
 from model import Case, InputError, Parameters, Trajectory
 from model.arrays import Array
 from model.files import check_writable, write_bytes
-from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_number
+from model.parameters import POSITIVE, Range, check_number
 
 DIGITS = 4
 """Of lengths, in units of R, and of parts of quaternions."""
@@ -33,13 +33,11 @@ def save(
     time: float = 60.0,
     speed: float = 0.25,
     rate: float = 60.0,
-    **arrows: float,
 ) -> str:
     """Write the page of a run; return in words what was written.
 
     It begins at a time `at` of the run, plays at a multiple `speed` of real time with `rate` frames
-    a second, and takes `time`, less if the run ends before; all in s. `arrows` are `force_arrow`
-    and `slip_arrow` of `geometry`.
+    a second, and takes `time`, less if the run ends before; all in s.
 
     Raises `InputError` for what can't be shown, and where NiceGUI, an extra, isn't installed;
     `StorageError` if the file can't be written."""
@@ -50,8 +48,6 @@ def save(
     check_number("at", at, "s", Range(begin, end), "to be within the run it")
     for name, value, unit in (("time", time, "s"), ("speed", speed, "1"), ("rate", rate, "s-1")):
         check_number(name, value, unit, POSITIVE)
-    for name, radii in arrows.items():
-        check_number(name, radii, "radii", NOT_NEGATIVE)
     step, until = speed / rate, min(at + time * speed, end)
     if (until - at) / step > MOST_FRAMES:
         raise InputError(
@@ -59,15 +55,15 @@ def save(
             f"time, or a lower rate"
         )
     times = np.arange(at, until + 1e-12, step)
-    moves = frames(run, times, **arrows)
+    moves = frames(run, times)
     write_bytes(output, write(run.header.parameters, speed, moves, run).encode())
     return f"{output}: {len(times)} frames"
 
 
-def frames(run: Trajectory, times: Array, **arrows: float) -> dict[str, Any]:
-    """What moves on the page, frame by frame, at times (n,) in s; `arrows` as in `save`."""
+def frames(run: Trajectory, times: Array) -> dict[str, Any]:
+    """What moves on the page, frame by frame, at times (n,) in s."""
     p, now = run.header.parameters, resampled(run, times)
-    seen = geometry(run, now, **arrows)
+    seen = geometry(run, now)
     columns = [
         seen.centres / p.R, seen.turns.as_quat(),
         *(part[k] / p.R for k in range(2) for part in (seen.contacts, seen.forces, seen.slips)),

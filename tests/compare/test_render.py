@@ -96,7 +96,6 @@ def test_a_run_is_shown_between_its_samples(run):
             r"at = 9 s is out of range: to be within the run it must be >= 0 and <= 0\.8$",
         ),
         ("p.html", {"speed": 0.0}, "speed = 0 is out of range"),
-        ("p.html", {"slip_arrow": -1.0}, "slip_arrow = -1 radii is out of range"),
         (
             "p.html",
             {"speed": 0.05, "rate": 1000},
