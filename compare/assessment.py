@@ -33,7 +33,7 @@ def full_verdict(claim: Claim, evidence: RecordsByEngine) -> Verdict:
     """The verdict on a claim by the engine on trial, and what each engine says, that one first."""
     (name, steps), *others = evidence.items()
     measured = steps[max(steps)]
-    thresholds = measured.select("thresholds", where=lambda m: m.quantity.startswith("omega_0"))
+    thresholds = measured.select("thresholds", where=lambda m: quantity(m.quantity).threshold)
     ends = {(m.set, m.value) for m in thresholds}
     if len(steps) == 1 and not engine(name).relative_tolerance:
         said = verdict(claim, measured)

@@ -112,7 +112,7 @@ def zero_step_limit(series: StepSeries, ends: Ends = frozenset()) -> Limit | Non
 
     What is counted, or unknown to theory, has none but what the finest step says."""
     m, scale, n = series.last.measurement, series.last.scale or 1.0, len(series.checks)
-    required, is_threshold = quantity(m.quantity).resolution, m.quantity.startswith("omega_0")
+    required, is_threshold = quantity(m.quantity).resolution, quantity(m.quantity).threshold
     if _next_to_threshold(m, ends):
         return None
     if required == 0 or (math.isnan(series.last.predicted) and n >= LEAST_STEPS):

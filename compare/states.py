@@ -43,13 +43,10 @@ def thresholds_of(m: Measurement) -> analytic.Thresholds:
     return theory(analytic.thresholds, m.parameters.replace(omega_0=1.0))
 
 
-def quantity_of(quantity: str, s: StationarySolution, p: Parameters) -> float:
-    """The value of a quantity, by its name in the measurements, in a stationary solution."""
-    if quantity == "wall_spin":
-        return float(bifurcation.wall_spin(s.state, p))
-    if quantity.startswith("force_"):
-        return float(forces(s.force_A, s.force_B)[quantity.removeprefix("force_")])
-    return float(getattr(s.state, quantity))
+def value_in(s: StationarySolution, m: Measurement) -> float:
+    """The value of the variable, or force, that was measured, in a stationary solution."""
+    known = forces(s.force_A, s.force_B) | s.state._asdict()
+    return float((known | {"wall_spin": bifurcation.wall_spin(s.state, m.parameters)})[m.of])
 
 
 def is_in(*cases: Case) -> When:

@@ -67,6 +67,11 @@ class Quantity:
     """Largest relative error of a prediction that a check may overlook."""
     scale: Scale | None = None
     """Its natural size; None where that is the predicted value."""
+    of: str = ""
+    """The variable, or force, of which it is the value, the rate of change, or the value at the
+    end; empty for what no state has."""
+    threshold: bool = False
+    """Whether it is a flow at which stationary solutions begin or end."""
 
     def size(self, p: Parameters, value: float = math.nan) -> float:
         """Natural size, by which its errors are divided: that of `scale`, or of a value."""
@@ -103,15 +108,15 @@ _ALL = (
     Quantity("case", "case", "1", 0.0),
     Quantity("cases", "cases reached", "1", 0.0),
     *(
-        Quantity(n, symbol, "rad s-1", 1e-7 if n == "omega_c" else 1e-6, scale)
+        Quantity(n, symbol, "rad s-1", 1e-7 if n == "omega_c" else 1e-6, scale, of=n)
         for n, (symbol, scale) in (_TURNS | _WALL_SPIN).items()
     ),
-    Quantity("v_y", "v_y", "m s-1", 1e-6, dragged_speed),
-    Quantity("y", "y", "m", 1e-2),
-    *(Quantity(f"force_{name}", symbol, "N", 1e-5, weight) for name, symbol in _FORCES.items()),
+    Quantity("v_y", "v_y", "m s-1", 1e-6, dragged_speed, of="v_y"),
+    Quantity("y", "y", "m", 1e-2, of="y"),
+    *(Quantity(f"force_{n}", symbol, "N", 1e-5, weight, of=n) for n, symbol in _FORCES.items()),
     *(
-        Quantity(f"moving_force_{name}", f"{symbol} in motion", "N", 5e-3, weight)
-        for name, symbol in _FORCES.items()
+        Quantity(f"moving_force_{n}", f"{symbol} in motion", "N", 5e-3, weight, of=n)
+        for n, symbol in _FORCES.items()
     ),
     Quantity("decay_rate", "−Re λ", "s-1", 2e-2),
     Quantity("slowest_decay", "slowest −Re λ < 0", "s-1", 2e-2),
@@ -125,20 +130,20 @@ _ALL = (
     Quantity("gamma_zero_square", "ω₀² at γ = 0", "rad2 s-2", 2e-2),
     Quantity("gamma_slope_square", "dγ/d(ω₀²)", "rad-1", 2e-2),
     *(
-        Quantity(f"rate_{name}", f"d{symbol}/dt", unit.replace("-1", "-2"), 5e-3, scale)
-        for name, symbol, unit, scale in _RATES
+        Quantity(f"rate_{n}", f"d{symbol}/dt", unit.replace("-1", "-2"), 5e-3, scale, of=n)
+        for n, symbol, unit, scale in _RATES
     ),
     *(
-        Quantity(f"after_{name}", f"{symbol} after", unit, 5e-2, _unit_of(name))
-        for name, symbol, unit, _ in _RATES
+        Quantity(f"after_{n}", f"{symbol} after", unit, 5e-2, _unit_of(n), of=n)
+        for n, symbol, unit, _ in _RATES
     ),
     Quantity("rebounds", "landings that rebound", "1", 0.0),
     *(
-        Quantity(f"omega_0{k}", f"ω₀{'₁₂₃₄'[k - 1]}", "rad s-1", 1e-3 if k == 4 else 1e-4)
-        for k in range(1, 5)
+        Quantity(f"omega_0{k}", f"ω₀{digit}", "rad s-1", resolution, threshold=True)
+        for k, digit, resolution in zip((1, 2, 3, 4), "₁₂₃₄", (1e-4, 1e-4, 1e-4, 1e-3), strict=True)
     ),
     *(
-        Quantity(f"edge_{n}", f"{symbol} on the edge", "rad s-1", 1e-3, scale)
+        Quantity(f"edge_{n}", f"{symbol} on the edge", "rad s-1", 1e-3, scale, of=n)
         for n, (symbol, scale) in (_TURNS | _WALL_SPIN).items()
     ),
     Quantity("lifts", "leaves the floor", "1", 0.0),
@@ -153,7 +158,7 @@ _ALL = (
     Quantity("landing_speed", "v_y at landing", "m s-1", 1e-3),
     Quantity("landing_impulse", "vertical impulse of a landing", "N s", 4e-2),
     *(
-        Quantity(f"end_{n}", f"{s} at the end", u, 5e-3, _unit_of(n))
+        Quantity(f"end_{n}", f"{s} at the end", u, 5e-3, _unit_of(n), of=n)
         for n, s, u in (("y", "y", "m"), ("h", "h", "m"), *(rate[:3] for rate in _RATES))
     ),
     Quantity("orbit_period", "period", "s", 1.5e-2),

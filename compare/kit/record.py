@@ -71,6 +71,11 @@ class Measurement:
         return Case[self.at["case"]]
 
     @property
+    def of(self) -> str:
+        """The variable, or force, that was measured: see `Quantity.of`."""
+        return quantity(self.quantity).of
+
+    @property
     def unit(self) -> str:
         """Unit of value and uncertainty."""
         return quantity(self.quantity).unit

@@ -47,25 +47,22 @@ def _eta_at_torus(orbit: Orbit) -> float:
 
 
 _ORBIT: dict[str, Callable[[Orbit], float]] = {
-    "period": lambda orbit: orbit.period,
-    "omega_c": lambda orbit: orbit.turn / orbit.period,
-    "height": lambda orbit: float(orbit.cycle.y.max()),
-    "multiplier": lambda orbit: float(np.abs(orbit.multipliers).max()),
-    "death": _eta_at_torus,
-    "size": lambda orbit: float(np.ptp(orbit.cycle.omega_c)),
+    "orbit_period": lambda orbit: orbit.period,
+    "orbit_omega_c": lambda orbit: orbit.turn / orbit.period,
+    "orbit_height": lambda orbit: float(orbit.cycle.y.max()),
+    "orbit_multiplier": lambda orbit: float(np.abs(orbit.multipliers).max()),
+    "orbit_death": _eta_at_torus,
+    "swing_period": lambda orbit: orbit.period,
+    "swing_omega_c": lambda orbit: orbit.turn / orbit.period,
+    "swing_size": lambda orbit: float(np.ptp(orbit.cycle.omega_c)),
 }
-
-
-def _of_orbit(quantity: str, orbit: Orbit) -> float:
-    """A quantity of an orbit, by its name in the measurements."""
-    return _ORBIT[quantity.partition("_")[2]](orbit)
 
 
 def _orbit_criteria(protocol: str, *quantities: str) -> tuple[Criterion, ...]:
     """Criteria on quantities of the periodic orbit that theory has near the measured one."""
 
     def predict(m: Measurement) -> float:
-        return _of_orbit(m.quantity, theory(orbits.refine, m.parameters, state(m), m.at["period"]))
+        return _ORBIT[m.quantity](theory(orbits.refine, m.parameters, state(m), m.at["period"]))
 
     return criteria(protocol, quantities, predict, by=_REFINED)
 
@@ -155,7 +152,7 @@ CLAIMS = (
         *criteria(
             "rebounding",
             ("orbit_period", "orbit_omega_c"),
-            lambda m: _of_orbit(m.quantity, _rebounding(m)),
+            lambda m: _ORBIT[m.quantity](_rebounding(m)),
             by=_REFINED,
         ),
         level=Level.DEFAULT,

@@ -56,7 +56,7 @@ def _end_of_motion(m: Measurement) -> Estimate:
     """A state variable of theory's motion at the time at which the measured one ends."""
     flow = late_ramp(m.parameters, m.at["rate"], m.at["time"]) if "rate" in m.at else None
     motion = simulated(m.parameters, state(m), m.at["time"], flow=flow)
-    value = float(getattr(motion, m.quantity.split("_", 1)[1])[-1])
+    value = float(getattr(motion, m.of)[-1])
     return integrated(value, quantity(m.quantity).size(m.parameters))
 
 
@@ -119,7 +119,7 @@ def _motion_either(m: Measurement) -> Trajectory:
 
 def _end_in_case(m: Measurement) -> float:
     """A variable of theory's motion at its end, by the name of the measured one."""
-    return float(getattr(_motion_either(m), m.quantity.removeprefix("end_"))[-1])
+    return float(getattr(_motion_either(m), m.of)[-1])
 
 
 LAW_CLAIMS = (
@@ -266,11 +266,11 @@ def _motion_criteria(case: Case) -> Iterator[Criterion]:
 
     def rate(m: Measurement) -> float:
         rates = theory(analytic.vector_field, case, state(m), m.parameters)
-        return float(rates[VARIABLES.index(m.quantity.removeprefix("rate_"))])
+        return float(rates[VARIABLES.index(m.of)])
 
     def force(m: Measurement) -> float:
         both = theory(analytic.contact_forces, case, state(m), m.parameters)
-        return float(forces(*both)[m.quantity.removeprefix("moving_force_")])
+        return float(forces(*both)[m.of])
 
     def lift(m: Measurement) -> float:
         return slip_stability.lift_acceleration(case, case, state(m), m.parameters)

@@ -15,7 +15,7 @@ from compare.judge import simulated
 from compare.kit.record import Measurement, Relation, state
 from model import Case
 from model.arrays import Array
-from model.kinematics import SLIP_XYZ
+from model.kinematics import SLIP_XYZ, VARIABLES
 
 _NR_NS = (Case.NR, Case.NS)
 _RR_RS = (Case.RR, Case.RS)
@@ -45,7 +45,8 @@ def _direction(m: Measurement) -> Array:
 
 def _gamma(m: Measurement) -> float:
     """gamma (53) along the measured direction of slip, rad s-2."""
-    n = [_direction(m)["xyz".index(name[-1])] for name in slip_stability.normals(*_arrow(m))]
+    along = dict(zip(VARIABLES[SLIP_XYZ], _direction(m), strict=True))
+    n = [along[name] for name in slip_stability.normals(*_arrow(m))]
     return float(slip_stability.gamma(*_arrow(m), _state(m), np.array(n), m.parameters))
 
 

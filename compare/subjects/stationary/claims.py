@@ -20,9 +20,9 @@ from compare.states import (
     is_in,
     lasting_cases,
     lifts_first,
-    quantity_of,
     slips_first,
     solution_of,
+    value_in,
 )
 from model import Case, State
 from model.drag import SCHILLER_NAUMANN
@@ -79,7 +79,7 @@ def _value_criteria(
 
     def predict(m: Measurement) -> float:
         state = theory(analytic.solution, m.parameters, of) if of else solution_of(m)
-        return quantity_of(m.quantity, state, m.parameters)
+        return value_in(state, m)
 
     return criteria(protocol, quantities, predict, when=when, by=by)
 

@@ -15,7 +15,7 @@ from analytic.stationary import slipping_branch
 from compare.claim import Criterion, When, claim, criteria, given
 from compare.judge import theory
 from compare.kit.record import Measurement, Relation
-from compare.states import quantity_of, thresholds_of
+from compare.states import thresholds_of, value_in
 from model import Case, Parameters
 
 _BY = "analytic.thresholds"
@@ -36,7 +36,7 @@ def _threshold(
 def _unstable_quantity(m: Measurement) -> float:
     """A quantity of the unstable SS, which is on the border between two basins."""
     unstable = theory(analytic.solution, m.parameters, Case.SS, stable=False)
-    return quantity_of(m.quantity.removeprefix("edge_"), unstable, m.parameters)
+    return value_in(unstable, m)
 
 
 def _greatest_flow(m: Measurement) -> float:
