@@ -63,11 +63,9 @@ class Bodies(Free):
     def read(self) -> State:
         for update in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_comVel):
             update(self.model, self.data)
-        found, rate = [], np.empty(6)
+        found, rate, kind = [], np.empty(6), mujoco.mjtObj.mjOBJ_BODY
         for body in self.bodies:
-            mujoco.mj_objectVelocity(
-                self.model, self.data, mujoco.mjtObj.mjOBJ_BODY, body.id, rate, 0
-            )
+            mujoco.mj_objectVelocity(self.model, self.data, kind, body.id, rate, 0)
             found += [body.xpos, rate[3:].copy(), rate[:3].copy()]
         return tuple(found)
 
@@ -101,11 +99,8 @@ class Lawful(Bodies):
         self.whole = self.timestep
 
     def step(self, n: int) -> None:
-        model, data, slow = (
-            self.model,
-            self.data,
-            2 * self.whole * float(np.linalg.norm(self.model.opt.gravity)),
-        )
+        model, data = self.model, self.data
+        slow = 2 * self.whole * float(np.linalg.norm(model.opt.gravity))
         for _ in range(n):
             mujoco.mj_step1(model, data)
             contact, seen = data.contact, data.contact.efc_address >= 0
@@ -179,19 +174,11 @@ def rigid(spec: Any, scene: Scene, timestep: float) -> None:
             spec.delete(spec.geom(f"{surface.name}{k}"))
         spec.option.tolerance /= _HEAVY  # the engine multiplies it by the mean inertia
         own, half = spec.worldbody.add_body(name=surface.name), _WALL * scene.body.size[0]
+        slide, box = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtGeom.mjGEOM_BOX
         for axis in ([-1, 0, 0], [0, 0, 1]):
-            own.add_joint(
-                type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis, armature=_HEAVY * scene.body.mass
-            )
-        box, friction = mujoco.mjtGeom.mjGEOM_BOX, [surface.friction, 0.0, 0.0]
-        own.add_geom(
-            name=surface.name,
-            type=box,
-            size=[half] * 3,
-            pos=[half, 0, 0],
-            friction=friction,
-            mass=1e-9,
-        )
+            own.add_joint(type=slide, axis=axis, armature=_HEAVY * scene.body.mass)
+        geom = own.add_geom(name=surface.name, type=box, size=[half] * 3, pos=[half, 0, 0])
+        geom.friction, geom.mass = [surface.friction, 0.0, 0.0], 1e-9
         spec.add_exclude(bodyname1="world", bodyname2=surface.name)
         key = spec.key("start")
         key.qpos, key.qvel = [*key.qpos, 0.0, 0.0], [*key.qvel, 0.0, 0.0]
