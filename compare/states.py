@@ -10,6 +10,7 @@ from compare.judge import theory
 from compare.kit.record import Measurement
 from compare.kit.settling import forces, physical_case
 from model import Case, Parameters
+from model.kinematics import VARIABLES
 
 
 def solutions(p: Parameters) -> list[StationarySolution]:
@@ -45,8 +46,11 @@ def thresholds_of(m: Measurement) -> analytic.Thresholds:
 
 def value_in(s: StationarySolution, m: Measurement) -> float:
     """The value of the variable, or force, that was measured, in a stationary solution."""
-    known = forces(s.force_A, s.force_B) | s.state._asdict()
-    return float((known | {"wall_spin": bifurcation.wall_spin(s.state, m.parameters)})[m.of])
+    if m.of == "wall_spin":
+        return float(bifurcation.wall_spin(s.state, m.parameters))
+    if m.of in VARIABLES:
+        return float(getattr(s.state, m.of))
+    return float(forces(s.force_A, s.force_B)[m.of])
 
 
 def is_in(*cases: Case) -> When:

@@ -43,6 +43,7 @@ def test_numbers_stand_beside_the_theory_that_was_asked():
     assert kept.place == "measurements/abc/settled.h5"
     theory = {link.text: link.place for link in found if link.what == "predicted by"}
     assert "def stable_solutions" in line(theory["analytic.stationary.solutions.stable_solutions"])
+    assert not any("wall_spin" in name for name in theory)  # of which nothing was measured
     (numbers,) = (link.numbers for link in found if link.numbers)
     row = dict(zip(*numbers, strict=True))
     assert (row["set"], row["measured"], row["predicted"]) == ("mine", "8.1 rad/s", "8")
