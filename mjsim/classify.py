@@ -42,7 +42,7 @@ _BACK = 16
 band."""
 
 
-class Contacts(NamedTuple):
+class ContactHistory(NamedTuple):
     """What the contacts A and B do in successive steps: arrays (steps, 2)."""
 
     normal: Array
@@ -78,14 +78,14 @@ class Classifier:
         """How many steps are."""
         self._waiting = 0
         """How many are not."""
-        self._latest = np.empty((len(Contacts._fields) + 1, 0, 2))
+        self._latest = np.empty((len(ContactHistory._fields) + 1, 0, 2))
         """The last steps, decided or not, and the state of the contacts in each of them judged
         alone."""
         self._changes: list[tuple[int, float, int, int]] = []
         """The first step of a new case, when it began in s, the case before and the new one; from
         the first case on."""
 
-    def add(self, contacts: Contacts, last: bool = False) -> None:
+    def add(self, contacts: ContactHistory, last: bool = False) -> None:
         """Take in the next steps; with `last` all are decided, since no more will come."""
         first = self._latest.shape[1] - self._waiting
         steps = np.concatenate([self._latest, [*contacts, self._judge(contacts)]], axis=1)
@@ -101,7 +101,7 @@ class Classifier:
         self.decided += stop - first
         self._waiting, self._latest = len(shown) - stop, steps[:, max(0, stop - _BACK) :].copy()
 
-    def _judge(self, contacts: Contacts) -> npt.NDArray[np.int_]:
+    def _judge(self, contacts: ContactHistory) -> npt.NDArray[np.int_]:
         """States of the contacts (rolling, slipping, open) by each step alone, (steps, 2)."""
         normal, friction, speed, _ = contacts
         limit = self._coefficients * normal

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from mjsim import recorder, scene
 from mjsim.classify import Classifier
 from mjsim.contact_settings import ContactModel, ContactSettings, RigidContacts
-from mjsim.mid_step import Ball, resistance
+from mjsim.mid_step import BallConstants, resistance
 from model import (
     Events,
     Flow,
@@ -169,7 +169,7 @@ def check_start(x: State, p: Parameters, settings: ContactModel) -> None:
 
 def check_timestep(timestep: float, p: Parameters, flow: Flow, t_end: float, x0: State) -> None:
     """`time_scales.check_timestep` with the drag of these engines."""
-    ball = Ball.of(p)
+    ball = BallConstants.of(p)
     time_scales.check_timestep(
         timestep, p, flow, t_end, lambda speed: resistance(speed, 0.0, 0.0, ball) / p.m, x0
     )

@@ -13,7 +13,7 @@ from model import Parameters
 from model.drag import QUADRATIC, SCHILLER_NAUMANN, STOKES
 
 
-class Ball(NamedTuple):
+class BallConstants(NamedTuple):
     """The numbers of a ball that drag and inertia need."""
 
     R: float
@@ -34,7 +34,7 @@ class Ball(NamedTuple):
     """Of the fluid, j m r^2 times its rate, kg m2 s-1; 0 where it is left out."""
 
     @classmethod
-    def of(cls, p: Parameters) -> Ball:
+    def of(cls, p: Parameters) -> BallConstants:
         """The numbers of one ball; raises KeyError for a law of `model.drag` without a formula
         here."""
         Re = 2 * p.r / (p.nu_f or math.inf)
@@ -58,7 +58,7 @@ class Velocity(NamedTuple):
     o_z: float
 
 
-def resistance(w_z: float, w_h: float, w_y: float, ball: Ball) -> float:
+def resistance(w_z: float, w_h: float, w_y: float, ball: BallConstants) -> float:
     """Drag divided by the speed of a centre that moves with w relative to the fluid, m c C_D Re/24,
     kg s-1."""
     Re = ball.Re * (w_z * w_z + w_h * w_h + w_y * w_y) ** 0.5
@@ -68,7 +68,13 @@ def resistance(w_z: float, w_h: float, w_y: float, ball: Ball) -> float:
 
 
 def mid_step_forces(
-    v: Velocity, last: Velocity, rho: float, omega_0: float, ahead: float, step: float, ball: Ball
+    v: Velocity,
+    last: Velocity,
+    rho: float,
+    omega_0: float,
+    ahead: float,
+    step: float,
+    ball: BallConstants,
 ) -> tuple[float, float, float, float, float, float]:
     """Forces of the joints: torque about the axis, inward, upward, N m and N; moments about x, y
     and z, N m.

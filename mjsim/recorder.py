@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from mjsim.classify import Contacts
+from mjsim.classify import ContactHistory
 from model import Parameters, State, trajectory
 from model.arrays import Array
 from model.kinematics import frame
@@ -49,13 +49,13 @@ def state(place: Array, qvel: Array, p: Parameters) -> State:
     return State(y, v_y, omega_c, o_x - roll, o_y + omega_c + roll, o_z - v_y / p.r, h, v_h)
 
 
-def contacts(rows: Array) -> Contacts:
+def contacts(rows: Array) -> ContactHistory:
     """Loads, friction, slip speeds and gaps of contacts in successive steps, from rows (steps,
     `COLUMNS`)."""
     each = rows[:, SENSORS:].reshape(len(rows), 2, NSENSOR // 2)
     normal, first, second = np.moveaxis(each[..., _FORCE], -1, 0)
     slips = np.moveaxis(each[..., _SLIP], -1, 0)
-    return Contacts(
+    return ContactHistory(
         normal,
         np.hypot(first, second),
         np.hypot(slips[0], slips[1]),

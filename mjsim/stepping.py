@@ -22,7 +22,7 @@ from mjsim.contact_settings import LANDING_PARTS, ContactModel, RigidContacts
 from mjsim.coulomb import Coulomb
 from mjsim.coulomb.compiling import entry
 from mjsim.coulomb.engine import mj_step, models
-from mjsim.mid_step import Ball, Velocity, mid_step_forces
+from mjsim.mid_step import BallConstants, Velocity, mid_step_forces
 from mjsim.recorder import COORDINATES, NSENSOR, SENSORS
 from model import Parameters, State
 from model.arrays import Array
@@ -57,7 +57,7 @@ class Joints(NamedTuple):
     """Whether the last step was divided for a landing, an array of one."""
     weight: float
     """N"""
-    ball: Ball
+    ball: BallConstants
     ahead: float
     """Steps by which places, and forces, are ahead of velocities."""
     step: float
@@ -222,7 +222,7 @@ class JointedBall:
             loads=np.zeros(2),
             landed=np.zeros(1, bool),
             weight=p.m * p.g,
-            ball=Ball(*map(float, Ball.of(p))),
+            ball=BallConstants(*map(float, BallConstants.of(p))),
             ahead=settings.midpoint,
             step=settings.timestep,
             model=model._address,

@@ -10,7 +10,7 @@ import analytic
 import mjsim
 from analytic.mechanics import drag
 from mjsim import RigidContacts, engine
-from mjsim.mid_step import Ball
+from mjsim.mid_step import BallConstants
 from mjsim.mid_step import resistance as in_mujoco
 from model import Flow, InputError, Parameters, State
 from model.drag import LAWS
@@ -20,7 +20,7 @@ from tests.drag_laws import BALL, BY_LAW, resistance
 @pytest.mark.parametrize("law", LAWS)
 def test_the_force_in_mujoco_is_that_of_the_law(law):
     p = BY_LAW[law]
-    ball = Ball.of(p)
+    ball = BallConstants.of(p)
     w = np.random.default_rng(3).normal(size=(3, 200)) * 10.0 ** np.linspace(-7, 1, 200)
     speeds = np.linalg.norm(w, axis=0)
     assert np.ptp(np.log10(2 * p.r * speeds / p.nu_f)) > 7
@@ -43,7 +43,7 @@ def test_the_drag_is_half_the_dynamic_pressure_times_area_and_coefficient():
     assert p.m * drag.coefficient(speed, p) * speed == pytest.approx(force, rel=1e-13)
 
 
-@pytest.mark.parametrize("ask", [lambda p: drag.coefficient(0.3, p), lambda p: Ball.of(p)])
+@pytest.mark.parametrize("ask", [lambda p: drag.coefficient(0.3, p), lambda p: BallConstants.of(p)])
 def test_a_law_without_a_formula_is_not_taken_for_another(ask, monkeypatch):
     monkeypatch.setattr("model.drag.LAWS", (*LAWS, "oseen"))
     with pytest.raises(KeyError, match="oseen"):

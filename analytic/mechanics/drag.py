@@ -25,12 +25,12 @@ EXPONENT, WAKE, BLUNT = 0.687, 0.15, 0.44
 numbers."""
 SPEED_STEPS = 8
 """Steps of Newton's method from less than twice the root to round-off: 6, and 2 more for the corner
-of `Law`."""
+of `DragLaw`."""
 FALL_STEPS = 100
 """Most steps of it to the end of a fall, far more than it takes."""
 
 
-class Law(NamedTuple):
+class DragLaw(NamedTuple):
     """c(|w|) = max(linear + wake |w|^0.687, blunt |w|) in s-1, with |w| in m s-1."""
 
     linear: float
@@ -38,19 +38,21 @@ class Law(NamedTuple):
     blunt: float
 
 
-def law(p: Parameters) -> Law:
+def law(p: Parameters) -> DragLaw:
     """The law of a parameter set. Raises KeyError for a law of `model.drag` that has no formula
     here."""
     per_speed = 2 * p.r / (p.nu_f or math.inf)
     laws = {
-        STOKES: Law(p.c, 0.0, 0.0),
-        SCHILLER_NAUMANN: Law(p.c, WAKE * p.c * per_speed**EXPONENT, BLUNT / 24 * p.c * per_speed),
-        QUADRATIC: Law(0.0, 0.0, p.C_D / 24 * p.c * per_speed),
+        STOKES: DragLaw(p.c, 0.0, 0.0),
+        SCHILLER_NAUMANN: DragLaw(
+            p.c, WAKE * p.c * per_speed**EXPONENT, BLUNT / 24 * p.c * per_speed
+        ),
+        QUADRATIC: DragLaw(0.0, 0.0, p.C_D / 24 * p.c * per_speed),
     }
     return laws[p.drag]
 
 
-def rate(speed: Real, law: Law) -> Real:
+def rate(speed: Real, law: DragLaw) -> Real:
     """c(|w|) of a law, s-1."""
     slow, fast = law.linear + law.wake * speed**EXPONENT, law.blunt * speed
     return slow * (slow >= fast) + fast * (slow < fast)  # max, for all kinds of numbers

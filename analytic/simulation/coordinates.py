@@ -47,7 +47,7 @@ from analytic.simulation.equations import (
     SR,
     SS,
     Fall,
-    Motion,
+    System,
 )  # fmt: skip
 from analytic.simulation.motion import HybridState
 from model import State
@@ -73,7 +73,7 @@ TURNING = ((0, 0), (0, 0), (0, 0), (0, 0), (2, 6), (4, 6), (0, 0), (5, 7), (0, 0
 direction."""
 
 
-def count_guards(k: Motion) -> int:
+def count_guards(k: System) -> int:
     """How many guards the motion has; the landing of a fall that is known needs none."""
     if k.case == NN:
         return 1 if k.fall.landing < math.inf else 2
@@ -84,7 +84,7 @@ def count_guards(k: Motion) -> int:
     return count
 
 
-def begin(case: int, at: HybridState, k: Motion, z: Any, scale: Any) -> tuple[Motion, int]:
+def begin(case: int, at: HybridState, k: System, z: Any, scale: Any) -> tuple[System, int]:
     """Begin a case at a moment: write coordinates z and their natural sizes; return its constants
     and their number."""
     if case % 3 == AWAY:
@@ -92,7 +92,7 @@ def begin(case: int, at: HybridState, k: Motion, z: Any, scale: Any) -> tuple[Mo
     return _begin_on_wall(case, at, k, z, scale)
 
 
-def _begin_on_wall(case: int, at: HybridState, k: Motion, z: Any, scale: Any) -> tuple[Motion, int]:
+def _begin_on_wall(case: int, at: HybridState, k: System, z: Any, scale: Any) -> tuple[System, int]:
     """As `begin`: z = (theta; omega_c, off the floor y, v_y, omega_c, slip_x; size and direction of
     slips; work)."""
     x, turns, side, n = at.x, case in (SS, NS), 0.0, 2
@@ -118,8 +118,8 @@ def _begin_on_wall(case: int, at: HybridState, k: Motion, z: Any, scale: Any) ->
 
 
 def _begin_off_wall(
-    case: int, at: HybridState, k: Motion, z: Any, scale: Any
-) -> tuple[Motion, int]:
+    case: int, at: HybridState, k: System, z: Any, scale: Any
+) -> tuple[System, int]:
     """As `begin`: z = (Z, dZ/dt; in SN speed and direction of the lowest point at rest; in NN y,
     v_y; work).
 
@@ -143,7 +143,7 @@ def _begin_off_wall(
     return equations.in_case(k, case, 0.0, k.line, fall), n + 1
 
 
-def hybrid_state(t: Any, z: Any, at: HybridState, k: Motion) -> HybridState:
+def hybrid_state(t: Any, z: Any, at: HybridState, k: System) -> HybridState:
     """The state with azimuth and work at a time t, from coordinates z of a case that began at the
     moment `at`.
 
@@ -167,7 +167,7 @@ def hybrid_state(t: Any, z: Any, at: HybridState, k: Motion) -> HybridState:
     return HybridState(t, z[0], State(y, v_y, omega_c, w_x, w_y, w_z, 0.0, 0.0), alpha, beta, z[-1])
 
 
-def _hybrid_state_off_wall(t: Any, z: Any, at: HybridState, k: Motion) -> HybridState:
+def _hybrid_state_off_wall(t: Any, z: Any, at: HybridState, k: System) -> HybridState:
     """As `moment`, for a ball away from the wall."""
     turn, u = cmath.exp(1j * at.theta), rigid_body.velocities(at.x, k)
     place, moves, y, v_y, alpha, slide = z[0] + 1j * z[1], z[2] + 1j * z[3], 0.0, 0.0, math.nan, 0j
@@ -203,7 +203,7 @@ def least_slip(z: Any, scale: Any, case: int) -> float:
     return least
 
 
-def rebound_time(at: HybridState, z: Any, k: Motion, rate: Any) -> float:
+def rebound_time(at: HybridState, z: Any, k: System, rate: Any) -> float:
     """How long a rebound that begins at a moment will last by the accelerations then, s; inf if
     none begins."""
     x, lasts = at.x, math.inf
@@ -217,7 +217,7 @@ def rebound_time(at: HybridState, z: Any, k: Motion, rate: Any) -> float:
     return lasts
 
 
-def arm_guards(values: Any, k: Motion, arm: Any, level: Any) -> bool:
+def arm_guards(values: Any, k: System, arm: Any, level: Any) -> bool:
     """Set the values above which guards are armed, and those at which they fire; whether a gap is
     zero at first.
 

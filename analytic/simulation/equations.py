@@ -60,8 +60,8 @@ class Fall(NamedTuple):
 NO_FALL = Fall(0.0, 0.0, math.inf)
 
 
-class Motion(NamedTuple):
-    """What the motion of one case depends on; in SI units."""
+class System(NamedTuple):
+    """The system in one case: all that its motion depends on; SI units."""
 
     m: float
     r: float
@@ -72,7 +72,7 @@ class Motion(NamedTuple):
     g: float
     c: float
     """Rate of Stokes' drag, s-1."""
-    law: drag.Law
+    law: drag.DragLaw
     """Of the drag."""
     stokes: bool
     """Whether that is Stokes'."""
@@ -96,10 +96,9 @@ class Motion(NamedTuple):
     fall: Fall
 
 
-def in_case(k: Motion, case: int, side: float, line: Line, fall: Fall) -> Motion:
-    """The constants of the motion, changed to another case, side, line of the flow or known
-    fall."""
-    return Motion(
+def in_case(k: System, case: int, side: float, line: Line, fall: Fall) -> System:
+    """The system in another case, with its side, line of the flow and known fall."""
+    return System(
         k.m,
         k.r,
         k.R,
@@ -123,7 +122,7 @@ def in_case(k: Motion, case: int, side: float, line: Line, fall: Fall) -> Motion
     )
 
 
-def fluid(t: float, k: Motion) -> float:
+def fluid(t: float, k: System) -> float:
     """omega_0 at a time, rad s-1: a line and waves."""
     start, value, slope = k.line
     omega_0 = value + slope * (t - start)
@@ -133,7 +132,7 @@ def fluid(t: float, k: Motion) -> float:
     return omega_0
 
 
-def drag_rate(w_h: float, w_y: float, w_k: float, k: Motion) -> float:
+def drag_rate(w_h: float, w_y: float, w_k: float, k: System) -> float:
     """c(|w|) of a velocity relative to the fluid, s-1."""
     if k.stokes:
         return k.c
@@ -154,7 +153,7 @@ def forces(
     c_A: float,
     s_B: float,
     c_B: float,
-    k: Motion,
+    k: System,
 ) -> tuple[float, float, float, float, float, float]:
     """Forces of floor and wall along i, j, k in the cases at the wall, N; in RR with B_y = 0.
 
@@ -183,7 +182,7 @@ def forces(
     return 0.0, 0.0, 0.0, u, k.eta * u * c_B, -k.eta * u * s_B
 
 
-def _wall_state(z: Any, k: Motion) -> tuple[float, ...]:
+def _wall_state(z: Any, k: System) -> tuple[float, ...]:
     """Of a ball at the wall: omega_c, v_y, slip_x, slip_z, q_A, sin and cos of alpha, q_B, those of
     beta, slip_y."""
     v_y = w_x = w_z = q_A = s_A = c_A = q_B = s_B = c_B = 0.0
@@ -205,7 +204,7 @@ def _wall_state(z: Any, k: Motion) -> tuple[float, ...]:
     return omega_c, v_y, w_x, w_z, q_A, s_A, c_A, q_B, s_B, c_B, q_B * s_B
 
 
-def rates(t: float, z: Any, k: Motion, out: Any) -> None:
+def rates(t: float, z: Any, k: System, out: Any) -> None:
     """Rates of the coordinates of a case."""
     if k.case % 3 == AWAY:
         return _rates_away(t, z, k, out)
@@ -248,7 +247,7 @@ def rates(t: float, z: Any, k: Motion, out: Any) -> None:
     out[first] = power
 
 
-def guards(t: float, z: Any, k: Motion, out: Any) -> None:
+def guards(t: float, z: Any, k: System, out: Any) -> None:
     """What is positive while a case lasts, in natural units, in the order of `coordinates.ENDS`."""
     if k.case % 3 == AWAY:
         return _guards_away(t, z, k, out)
@@ -275,21 +274,21 @@ def guards(t: float, z: Any, k: Motion, out: Any) -> None:
         out[0], out[1] = z[1] / k.R, slips
 
 
-def loads(omega_c: float, t: float, k: Motion) -> tuple[float, float]:
+def loads(omega_c: float, t: float, k: System) -> tuple[float, float]:
     """As `rolling_forces._loads`: centrifugal load and friction of RR, in units of the weight."""
     lag = abs(omega_c - fluid(t, k))
     friction = k.j * drag_rate(0.0, 0.0, k.R * lag, k) * k.R / k.g * lag / (1 + 2 * k.j)
     return k.R / k.g * omega_c * omega_c, friction
 
 
-def last_share(u: float, z: float, k: Motion) -> float:
+def last_share(u: float, z: float, k: System) -> float:
     """B_y in units of the weight at which RR ends, from its loads, as
     `rolling_forces._last_share`."""
     at_B = (1 + k.j) * u
     return min(max(at_B - _normal_forces(at_B, z, k.eta)[0], 0.0), k.j * u)
 
 
-def slip_margin(u: float, z: float, k: Motion) -> float:
+def slip_margin(u: float, z: float, k: System) -> float:
     """How far RR is from a slip that lasts, in units of the weight, from its loads, as
     `rolling_forces.slip_margin`."""
     share = last_share(u, z, k)
@@ -298,7 +297,7 @@ def slip_margin(u: float, z: float, k: Motion) -> float:
     )
 
 
-def rolls_on(omega_c: float, t: float, k: Motion) -> float:
+def rolls_on(omega_c: float, t: float, k: System) -> float:
     """How far RR is from where it is left, >= 0 while it lasts: `slip_margin`, or
     `rolling_forces.margin`."""
     u, z = loads(omega_c, t, k)
@@ -321,7 +320,7 @@ def _normal_forces(d: float, z: float, friction: float) -> tuple[float, float]:
     return low, (top / (1 - friction * friction) if friction < 1 else math.inf)
 
 
-def _horizontal_drag(t: float, z: Any, rise: float, k: Motion) -> tuple[complex, complex, float]:
+def _horizontal_drag(t: float, z: Any, rise: float, k: System) -> tuple[complex, complex, float]:
     """Off the wall: complex horizontal velocity, that relative to the fluid, m s-1, and the drag
     rate c(|w|), s-1."""
     V = complex(z[2], z[3])
@@ -329,7 +328,7 @@ def _horizontal_drag(t: float, z: Any, rise: float, k: Motion) -> tuple[complex,
     return V, lag, drag_rate(lag.real, rise, lag.imag, k)
 
 
-def _rates_away(t: float, z: Any, k: Motion, out: Any) -> None:
+def _rates_away(t: float, z: Any, k: System, out: Any) -> None:
     """`rates` of a ball away from the wall."""
     rise = 0.0
     if k.case == NN:
@@ -352,7 +351,7 @@ def _rates_away(t: float, z: Any, k: Motion, out: Any) -> None:
     out[0], out[1], out[2], out[3], out[last] = V.real, V.imag, push.real, push.imag, power
 
 
-def _guards_away(t: float, z: Any, k: Motion, out: Any) -> None:
+def _guards_away(t: float, z: Any, k: System, out: Any) -> None:
     """`guards` of a ball away from the wall."""
     gap = 1 - math.sqrt(z[0] * z[0] + z[1] * z[1]) / k.R
     if k.case == RN:
@@ -366,7 +365,7 @@ def _guards_away(t: float, z: Any, k: Motion, out: Any) -> None:
             out[1] = z[4] / k.R
 
 
-def fall_speed(t: float, k: Motion) -> float:
+def fall_speed(t: float, k: System) -> float:
     """v_y of a free flight with Stokes' drag at a time, m s-1, as `drag.fall_speed`."""
     since, v_y, _ = k.fall
     return v_y - (k.c * v_y + k.g) * (
@@ -374,7 +373,7 @@ def fall_speed(t: float, k: Motion) -> float:
     )
 
 
-def smooth_rates(u: Velocities, h: float, t: float, k: Motion) -> Velocities:
+def smooth_rates(u: Velocities, h: float, t: float, k: System) -> Velocities:
     """Rates of u by gravity, drag and the turning of the axes: (20) with (9), no contact; h is the
     gap at B."""
     turn, w_k = u.v_k / (k.R - h), u.v_k - fluid(t, k) * (k.R - h)

@@ -19,7 +19,7 @@ from analytic.mechanics import dynamics
 from analytic.mechanics.rigid_body import Forces
 from analytic.simulation import compiling, coordinates, equations, motion, transitions
 from analytic.simulation.coordinates import NONE
-from analytic.simulation.equations import A_LANDS, AWAY, Motion
+from analytic.simulation.equations import A_LANDS, AWAY, System
 from analytic.simulation.integrator import StalledError, first_pace, stretch
 from analytic.simulation.motion import HybridState, Recorder
 from analytic.simulation.settings import ENDLESS, Settings
@@ -101,7 +101,7 @@ def _state_parts(at: HybridState) -> tuple[Any, ...]:
 
 
 def follow(
-    case: int, at: HybridState, until: float, k: Motion, run: Record, steps: int
+    case: int, at: HybridState, until: float, k: System, run: Record, steps: int
 ) -> tuple[int, HybridState]:
     """Follow one case to the first guard, up to a time, or for so many steps: what ended it, and
     the moment then."""
@@ -139,7 +139,7 @@ def follow(
     return fired, _with_nearest_azimuth(coordinates.hybrid_state(now, z, at, k), k, near)
 
 
-def _with_nearest_azimuth(at: HybridState, k: Motion, near: float) -> HybridState:
+def _with_nearest_azimuth(at: HybridState, k: System, near: float) -> HybridState:
     """The same moment; of the azimuths that it may have off the wall that which is nearest to
     another."""
     if k.case % 3 != AWAY:
@@ -161,7 +161,7 @@ def _keep_samples(of: Stretch, at: HybridState, taken: int, run: Record) -> floa
     return near
 
 
-def _keep_sample(at: HybridState, k: Motion, run: Record) -> None:
+def _keep_sample(at: HybridState, k: System, run: Record) -> None:
     """Store a moment as the next sample."""
     row = run.taken[0]
     for i in range(8):
@@ -196,7 +196,7 @@ def _quiet_from(landed: float, times: Array, quiet: float) -> float:
 
 @compiling.compiled
 def run_through_flow(
-    stage: Stage, k: Motion, pieces: Any, run: Record, strides: int, steps: int
+    stage: Stage, k: System, pieces: Any, run: Record, strides: int, steps: int
 ) -> tuple[Any, ...]:
     """Follow a run to its last sample, to where it is stopped, or for some strides: whether it is
     over, and its stage.
@@ -240,9 +240,9 @@ def run_through_flow(
 
 
 @lru_cache
-def prepare(p: Parameters, flow: Flow, settings: Settings, t_end: float) -> tuple[Motion, Array]:
-    """What runs of one ball in one flow share: constants of the motion, and pieces of the flow as
-    rows of an array."""
+def prepare(p: Parameters, flow: Flow, settings: Settings, t_end: float) -> tuple[System, Array]:
+    """What runs of one ball in one flow share: the system, and pieces of the flow as rows of an
+    array."""
     k, rows = motion.of_ball(p, flow, settings), []
     for start, end in pairwise([0.0, *flow.knots(t_end).tolist(), t_end]):
         jump = abs(float(flow.line(start) - flow.line(np.nextafter(start, -1.0))))
@@ -259,7 +259,7 @@ def prepare(p: Parameters, flow: Flow, settings: Settings, t_end: float) -> tupl
 
 def carry_out(
     start: HybridState,
-    k: Motion,
+    k: System,
     pieces: Array,
     rows: Callable[[], Record],
     look: Callable[[Record], None] | None = None,

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from analytic.mechanics import drag, rigid_body
 from analytic.simulation import equations
-from analytic.simulation.equations import Line, Motion
+from analytic.simulation.equations import Line, System
 from analytic.simulation.settings import Settings
 from model import Case, Events, Flow, Header, Parameters, State, Trajectory
 from model.arrays import Array
@@ -44,18 +44,18 @@ def line_of(flow: Flow, start: float) -> Line:
     return Line(float(flow.start[k]), float(flow.value[k]), float(flow.slope[k]))
 
 
-def of_ball(p: Parameters, flow: Flow, settings: Settings) -> Motion:
+def of_ball(p: Parameters, flow: Flow, settings: Settings) -> System:
     """The constants of a ball's motion as plain numbers, with the flow at first; `in_case` sets the
     case."""
     m, r, R, j, mu, eta, g, c = map(float, (p.m, p.r, p.R, p.j, p.mu, p.eta, p.g, p.c))
-    law, unit = drag.Law(*map(float, drag.law(p))), math.sqrt(R / g)
+    law, unit = drag.DragLaw(*map(float, drag.law(p))), math.sqrt(R / g)
     leaves = {"slip-stability": equations.STABILITY, "infeasible": equations.FEASIBILITY}[
         settings.leave_rolling
     ]
     waves = np.array(
         [(amplitude, 2 * math.pi * f, phase) for amplitude, f, phase in flow.waves.tolist()]
     ).reshape(-1, 3)
-    return Motion(
+    return System(
         m,
         r,
         R,

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from scipy.integrate import DOP853
 
 from analytic.simulation import coordinates, equations
-from analytic.simulation.equations import FINER, LOCAL, PATIENCE, SMALL_SLIP, Motion
+from analytic.simulation.equations import FINER, LOCAL, PATIENCE, SMALL_SLIP, System
 from model.arrays import Array
 
 DONE, FIRED, STUCK, PAUSED, OTHER = range(5)
@@ -51,7 +51,7 @@ COLUMNS, USUAL = 12, 9
 class Stretch(NamedTuple):
     """What to integrate; z, level and samples are written to."""
 
-    k: Motion
+    k: System
     until: float
     """s"""
     z: Array
@@ -90,7 +90,7 @@ def _root(
     high: float,
     t: float,
     h: float,
-    k: Motion,
+    k: System,
     z: Array,
     F: Array,
     now: Array,
@@ -142,7 +142,7 @@ def _weighted_sum(weights: Array, count: int, K: Array, out: Array) -> None:
 
 
 def _interpolant(
-    t: float, h: float, k: Motion, z: Array, new: Array, K: Array, now: Array, F: Array
+    t: float, h: float, k: System, z: Array, new: Array, K: Array, now: Array, F: Array
 ) -> None:
     """Coefficients F of the interpolant of a step from z to `new`, from its stages K; three of
     these it computes."""
@@ -164,7 +164,7 @@ def _interpolant(
 def _first_fall(
     t: float,
     h: float,
-    k: Motion,
+    k: System,
     z: Array,
     F: Array,
     arm: Array,

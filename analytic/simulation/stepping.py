@@ -38,7 +38,7 @@ iterations leave."""
 class Constants(NamedTuple):
     """Parameters and settings of a step."""
 
-    law: drag.Law
+    law: drag.DragLaw
     m: float
     r: float
     R: float

@@ -34,7 +34,7 @@ from analytic.simulation.equations import (
     SLIPS,
     SR,
     SS,
-    Motion,
+    System,
 )  # fmt: skip
 from analytic.simulation.motion import HybridState
 from model import State
@@ -53,7 +53,7 @@ leaves less."""
 UNSETTLED = "the contact problem doesn't settle"
 
 
-def react(guard: int, case: int, at: HybridState, k: Motion) -> tuple[int, HybridState, Forces]:
+def react(guard: int, case: int, at: HybridState, k: System) -> tuple[int, HybridState, Forces]:
     """What follows when a guard has fired: the next case, the moment at its start, and impulses of
     an impact."""
     x, A, B = at.x, case // 3, case % 3
@@ -112,7 +112,7 @@ def react(guard: int, case: int, at: HybridState, k: Motion) -> tuple[int, Hybri
     )
 
 
-def settle(at: HybridState, k: Motion) -> tuple[int, HybridState, Forces]:
+def settle(at: HybridState, k: System) -> tuple[int, HybridState, Forces]:
     """Collide if the ball moves into something it touches, then find the case."""
     x, impulse = at.x, NOTHING
     if (x.y == 0 and x.v_y < 0) or (x.h == 0 and x.v_h < 0):
@@ -126,7 +126,7 @@ def with_directions(at: HybridState, x: State, alpha: float, beta: float) -> Hyb
     return HybridState(at.time, at.theta, x, alpha, beta, at.work)
 
 
-def choose(at: HybridState, k: Motion) -> tuple[int, HybridState]:
+def choose(at: HybridState, k: System) -> tuple[int, HybridState]:
     """The case in which a ball goes on, and the moment with the directions of slip filled in.
 
     Contacts are closed where gap and normal speed are exactly zero, and still where the slip is.
@@ -146,7 +146,7 @@ def choose(at: HybridState, k: Motion) -> tuple[int, HybridState]:
     return leave(at, k)
 
 
-def leave(at: HybridState, k: Motion) -> tuple[int, HybridState]:
+def leave(at: HybridState, k: System) -> tuple[int, HybridState]:
     """The case that follows RR where slip or lift lasts, and the moment with its slip directions.
 
     Friction is full where slip sets in and opposes it: forces and rates pass continuously from
@@ -179,7 +179,7 @@ def _contact(closed: bool, s: float, t: float) -> Closed:
 
 
 def _by_accelerations(
-    at: HybridState, A: Closed, B: Closed, start: Forces, k: Motion
+    at: HybridState, A: Closed, B: Closed, start: Forces, k: System
 ) -> tuple[int, HybridState]:
     """Case and slip directions by the contact problem of the accelerations, solved from the forces
     `start`."""
@@ -196,7 +196,7 @@ def _by_accelerations(
 
 
 def _contact_after(
-    contact: Closed, load: float, rise: float, s: float, t: float, k: Motion
+    contact: Closed, load: float, rise: float, s: float, t: float, k: System
 ) -> tuple[int, float, float]:
     """State of a contact from its force and accelerations, and the direction in which it slips if
     it does."""
@@ -208,7 +208,7 @@ def _contact_after(
     return (SLIPS, s, t) if math.hypot(s, t) > still else (ROLLS, 0.0, 0.0)
 
 
-def collide(at: HybridState, k: Motion) -> tuple[HybridState, Forces]:
+def collide(at: HybridState, k: System) -> tuple[HybridState, Forces]:
     """The moment after an impact, and its impulses: all contacts that touch at once, by Newton's
     restitution.
 

@@ -16,9 +16,9 @@ import numpy.typing as npt
 
 from compare.adapters.free import BreakdownError, Free, Library
 from compare.adapters.scene import Body, Scene, Surface, Vector
-from mjsim.classify import Classifier, Contacts
+from mjsim.classify import Classifier, ContactHistory
 from mjsim.engine import EVENT_TIMES, check_timestep, sampling
-from mjsim.mid_step import Ball, resistance
+from mjsim.mid_step import BallConstants, resistance
 from model import Flow, Header, InputError, Parameters, State, Trajectory
 from model.kinematics import Motion, check_place, frame, from_world, to_world
 from model.parameters import POSITIVE, check_number
@@ -65,13 +65,13 @@ def scene_fields(p: Parameters, x: State) -> dict[str, Any]:
 class Vessel(Scene):
     """A ball in the study's vessel, with its law of drag and its flow."""
 
-    ball: Ball
+    ball: BallConstants
     fluid: Flow
 
     @classmethod
     def of(cls, p: Parameters, x: State, flow: Flow) -> Vessel:
         """The scene of a ball with these parameters, which starts at azimuth zero."""
-        return cls(name="vessel", **scene_fields(p, x), ball=Ball.of(p), fluid=flow)
+        return cls(name="vessel", **scene_fields(p, x), ball=BallConstants.of(p), fluid=flow)
 
     @property
     def forced(self) -> bool:
@@ -196,5 +196,5 @@ class _Steps:
         if np.isnan(A).any():
             loads = (gaps < _REACH * p.r) * 1.0
             used = np.array([p.mu, p.eta]) * loads * (slips > 3 * self.band)
-        self.classifier.add(Contacts(loads, used, slips, gaps), last)
+        self.classifier.add(ContactHistory(loads, used, slips, gaps), last)
         self.kept.append(block[steps % self.every == 0])

@@ -7,7 +7,7 @@ import pytest
 import mjsim
 from docs.studies.states import HITTING, LANDING
 from mjsim import RigidContacts
-from mjsim.classify import PERSISTENCE, Classifier, Contacts
+from mjsim.classify import PERSISTENCE, Classifier, ContactHistory
 from model import Case, Parameters
 
 P = Parameters.named("reference")
@@ -23,7 +23,7 @@ def made(cases):
     closed, slips = letters != "N", letters == "S"
     normal = WEIGHT * closed
     friction = np.array([P.mu, P.eta]) * normal * np.where(slips, 1.0, 0.5)
-    return Contacts(normal, friction, FAST * slips, 0.01 * ~closed)
+    return ContactHistory(normal, friction, FAST * slips, 0.01 * ~closed)
 
 
 def classified(steps, sizes):
@@ -34,7 +34,7 @@ def classified(steps, sizes):
     )
     for size in sizes:
         stop = min(start + size, count)
-        classifier.add(Contacts(*(each[start:stop] for each in steps)), stop == count)
+        classifier.add(ContactHistory(*(each[start:stop] for each in steps)), stop == count)
         start = stop
     return classifier.cases(np.arange(count)), classifier.events()
 

@@ -15,8 +15,8 @@ import numpy as np
 from analytic.bifurcation import diagram as bifurcation
 from analytic.bifurcation.diagram import Exists
 from analytic.mechanics import rolling_forces
-from analytic.mechanics.drag import Law
-from analytic.simulation.equations import Motion
+from analytic.mechanics.drag import DragLaw
+from analytic.simulation.equations import System
 from analytic.slipping import slip_bounds
 from compare.kit.levels import Level
 from model import Case, Flow, Parameters, State
@@ -46,7 +46,7 @@ def without(case: Case) -> Fault:
     return answer(lambda solutions: [s for s in solutions if s.case is not case])
 
 
-Ball = Parameters | Motion
+Ball = Parameters | System
 """The parameters of a ball, as they are given or as plain numbers."""
 
 
@@ -68,7 +68,7 @@ def replaced(p: Ball, **values: Any) -> Ball:
     """The parameters with some of them changed."""
     if isinstance(p, Parameters):
         return p.replace(**values)
-    law = Law(*(term * (values.get("c", p.c) / p.c if p.c else 1.0) for term in p.law))
+    law = DragLaw(*(term * (values.get("c", p.c) / p.c if p.c else 1.0) for term in p.law))
     return p._replace(law=law, **values)
 
 
