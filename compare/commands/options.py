@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from compare.adapters import ASKED
 from compare.kit.pages import readable
 from model import InputError, Parameters, drag
 from model.errors import suggestion
@@ -204,9 +205,8 @@ def engine(name: str) -> Any:
         raise argparse.ArgumentTypeError(str(error)) from error
 
 
-FOREIGN = "dart, drake, pybullet, rapier, sapien"
-"""Those that others have written, each as NAME and NAME-defaults: tests see to it that none is
-missing."""
+FOREIGN = ", ".join(sorted(ASKED))
+"""Those that others have written, each as NAME and NAME-defaults."""
 PREFIX = "parameter_"
 """How the destinations of options begin that are parameters of the ball."""
 

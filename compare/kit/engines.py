@@ -15,7 +15,7 @@ import numpy as np
 
 import analytic
 import mjsim
-from compare.adapters import KNOWN, siconos, vessel
+from compare.adapters import ASKED, KNOWN, siconos, vessel
 from compare.adapters.free import Library
 from compare.kit.scales import time_unit
 from mjsim import ContactSettings, RigidContacts
@@ -259,11 +259,7 @@ DEFAULTS = replace(
 )
 _OTHERS = (
     *_adapted(siconos.LIBRARY, "p"),
-    *_adapted(_PACKAGES["pybullet"], "v1"),
-    *_adapted(_PACKAGES["drake"], "D+"),
-    *_adapted(_PACKAGES["dart"], "<3"),
-    *_adapted(_PACKAGES["rapier"], ">4"),
-    *_adapted(_PACKAGES["sapien"], "hH"),
+    *(each for name, marks in ASKED.items() for each in _adapted(_PACKAGES[name], marks)),
 )
 USUAL_ENGINES = (MUJOCO, PLAIN, DEFAULTS)
 """Who is asked of a claim where no engine is named: the one on trial, and two beside it."""
