@@ -1,6 +1,7 @@
 """What pages print is true: commands are those of the program, and what stands below one is what it
 says. Pages with cells are run where they are built."""
 
+import importlib.util
 import os
 import re
 import shlex
@@ -23,6 +24,11 @@ PAGES = [
     *sorted(DOCS.glob("*.md")),
     *sorted(DOCS.glob("notebooks/*.py")),
 ]
+WRITTEN = [
+    ROOT / "mjsim" / "coulomb" / "README.md",
+    *sorted(DOCS.glob("records/**/*.md")),
+]
+"""Pages that say what was done and how; their commands exist, and may take hours."""
 LIMITS = {"README.md": 700, "CHANGELOG.md": 1500}
 """Words of a page, at most."""
 ALL = 24_700
@@ -60,25 +66,36 @@ def commands(page: Path) -> list[str]:
     return [each for each in told if not re.search(r"\b[A-Z]{2,}\b|…", each)]
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_commands_of_pages_are_those_of_the_program(page, monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
-    for line in commands(page):
-        words = shlex.split(line)[1:]
-        parsers.parser(words).parse_args(words)  # or raises, and says which
-
-
-def test_every_command_is_on_a_page():
-    told = {line.split()[1] for page in PAGES for line in commands(page)}
-    assert told >= {*COMMANDS}
-
-
 @pytest.fixture
 def here(monkeypatch, tmp_path):
     """A directory from which pages see the files of the clone that they name."""
     (tmp_path / "docs").symlink_to(DOCS)
     monkeypatch.chdir(tmp_path)
     return tmp_path
+
+
+@pytest.mark.parametrize("page", [*PAGES, *WRITTEN], ids=lambda page: page.stem)
+def test_commands_of_pages_are_those_of_the_program(page, here):
+    for line in commands(page):
+        words = shlex.split(line)[1:]
+        parsers.parser(words).parse_args(words)  # or raises, and says which
+
+
+@pytest.mark.parametrize("page", [*PAGES, *WRITTEN], ids=lambda page: page.stem)
+def test_modules_and_steps_of_make_that_pages_name_are_there(page):
+    make = (ROOT / "Makefile").read_text("utf-8")
+    shown = "\n".join(block.text for block in blocks(page) if block.language == "sh")
+    said = re.findall(r"`([^`\n]+(?:\n[^`\n]+)?)`", written(page))
+    told = "\n".join([shown, *said])
+    for module in re.findall(r"^python -m\s+([\w.]+)", told, re.M):
+        assert importlib.util.find_spec(module), module
+    for step in re.findall(r"^make ([a-z-]+)", told, re.M):
+        assert re.search(rf"^{step}:", make, re.M), step
+
+
+def test_every_command_is_on_a_page():
+    told = {line.split()[1] for page in PAGES for line in commands(page)}
+    assert told >= {*COMMANDS}
 
 
 def test_what_readme_shows_below_a_command_is_what_it_says(here, capsys, monkeypatch):
@@ -104,6 +121,7 @@ NEEDS_MORE = {
     "explore": "it waits for a browser",
     "--scheduler": "it wants a cluster",
     "mypkg": "an adapter of the reader's own",
+    "dask_jobqueue": "it wants a cluster",
 }
 """What isn't run as printed, by a word of it, and why."""
 
@@ -170,6 +188,21 @@ def test_commands_run_as_printed(page, at_home):
     own = any(line.startswith("dualball sweep") for line in lines)
     for line in lines if own else [SWEEP, *lines]:
         at_home(line)
+
+
+def self_contained(page: Path) -> list[str]:
+    """The Python of a page that begins with what it imports, in blocks that aren't cells."""
+    return [
+        block.text for block in blocks(page)
+        if block.language == "python" and re.match("import|from", block.text)
+        and not any(word in block.text for word in NEEDS_MORE)
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("page", [*filter(self_contained, PAGES[1:])], ids=lambda page: page.stem)
+def test_python_runs_as_printed(page, here):
+    for text in self_contained(page):
+        exec(text, {})
 
 
 def test_pages_stay_short():

@@ -153,9 +153,9 @@ def _opening_sentence(ran: Sequence[Verdict]) -> str:
     if not orbits:
         return "Its closed-form theory by Antali and Stépán is held against simulation."
     return (
-        "In stationary states the angular velocity ω_c of its orbit, predicted in closed form by "
-        f"Antali and Stépán, is {len(orbits)} of the numbers below; the largest relative deviation "
-        f"of these is {max(abs(check.deviation / check.scale) for check in orbits):.1e}."
+        "Antali and Stépán predict its angular velocity ω_c in closed form. In stationary states "
+        f"it was measured {len(orbits)} times, and is off by a share of "
+        f"{max(abs(check.deviation / check.scale) for check in orbits):.1e} at most."
     )
 
 

@@ -263,7 +263,7 @@ def holding() -> Rows:
             for scene, name in SCENES.items()
         ),
         [
-            "box that is pulled: breaks away at, μN",
+            "box that is pulled: breaks away at, share of Coulomb's limit",
             *(f"{breakaway(way):.4f}" for way in WAYS.values()),
         ],
         [
@@ -319,7 +319,7 @@ def sliding() -> Rows:
         )
         rows += [
             [
-                "box that slides down 20°, μ 0.25: error of its acceleration",
+                "box that slides down 20°, μ 0.25: relative error of its acceleration",
                 f"{1e3 * step:g}",
                 *(f"{x:.1e}" for x, _ in down),
             ],
@@ -330,12 +330,12 @@ def sliding() -> Rows:
                 *(f"{1e6 * x:.2g}" for x, _ in pushed),
             ],
             [
-                "its way, relative to v²/(2 μ g)",
+                "relative error of its way, v²/(2 μ g)",
                 f"{1e3 * step:g}",
                 *(f"{way:+.1e}" for _, way in pushed),
             ],
             [
-                "ball that slides, then rolls: 5/7 v",
+                "ball that slides, then rolls with 5/7 v: relative error",
                 f"{1e3 * step:g}",
                 *(f"{rolling(step, way):+.1e}" for way in ways.values()),
             ],

@@ -236,7 +236,7 @@ def section(
 
 Found: **{found} of the {live} faults that change a prediction or a measurement**, of {len(key)}
 that were planted. Rules as
-of the commit {current_commit()[:12] or "unknown"}. Sets, SI: {where}.
+of the commit `{current_commit()[:12] or "unknown"}`. Sets, SI: `{where}`.
 
 {pages.markdown(counts)}
 
