@@ -12,7 +12,7 @@ from typing import Any
 import dartpy as engine
 import numpy as np
 
-from compare.adapters.free import Free, State, Touch
+from compare.adapters.free import BodyState, Free, Touch
 from compare.adapters.scene import Vector
 from model.arrays import Array
 from model.kinematics import rotated
@@ -104,7 +104,7 @@ class Dart(Free):
             joint.setCommand(0, turning)
         super().advance()
 
-    def read(self) -> State:
+    def read(self) -> BodyState:
         return sum(
             ((n.getCOM(), n.getLinearVelocity(), n.getAngularVelocity()) for n in self.nodes), ()
         )

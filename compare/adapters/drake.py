@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 import pydrake.all as engine
 
-from compare.adapters.free import Free, State, Touch
+from compare.adapters.free import BodyState, Free, Touch
 from compare.adapters.scene import Surface, Vector, facing
 from model.arrays import Array
 
@@ -165,7 +165,7 @@ class Drake(Free):
             self.plant.EvalUniquePeriodicDiscreteUpdate(self.context).get_vector(0).CopyToVector()
         )
 
-    def read(self) -> State:
+    def read(self) -> BodyState:
         pose, rate = (self.x[part] for part in self.ball)
         return pose[4:], rate[3:], rate[:3]
 

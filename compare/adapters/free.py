@@ -24,7 +24,7 @@ CORNERS = (
     "the ball"
 )
 """Why a ball in facets is slow."""
-State = tuple[Any, ...]
+BodyState = tuple[Any, ...]
 """Position, velocity and spin in world axes; of two bodies those of both."""
 
 
@@ -118,7 +118,7 @@ class Free(ABC):
         self.scene: Scene
         self.world: Any
         self.timestep = self.now = self.ahead = 0.0
-        self.seen: State | None = None
+        self.seen: BodyState | None = None
 
     def build(self, scene: Scene, timestep: float) -> None:
         """Put the scene into the engine; raises `NotImplementedError` if it can't have it."""
@@ -148,13 +148,13 @@ class Free(ABC):
             self.seen = None
             self.now += self.timestep
 
-    def look(self) -> State:
+    def look(self) -> BodyState:
         """The state as the engine has it, read once a step."""
         if self.seen is None:
             self.seen = self.read()
         return self.seen
 
-    def state(self) -> State:
+    def state(self) -> BodyState:
         """The state now: positions are taken back to where velocities are."""
         parts = [np.array(part, float) for part in self.look()]
         for k in range(0, len(parts), 3):
@@ -180,7 +180,7 @@ class Free(ABC):
         self.world.step()
 
     @abstractmethod
-    def read(self) -> State:
+    def read(self) -> BodyState:
         """Read the state as the engine has it."""
 
     def push(self, force: Vector) -> None:

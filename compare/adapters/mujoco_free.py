@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 import mjsim
-from compare.adapters.free import CORNERS, Free, State, Touch
+from compare.adapters.free import CORNERS, BodyState, Free, Touch
 from compare.adapters.scene import FACETS, TIME_STEPS, Scene, Vector, facing
 from model.arrays import Array
 
@@ -60,7 +60,7 @@ class Bodies(Free):
     def advance(self) -> None:
         mujoco.mj_step(self.model, self.data)
 
-    def read(self) -> State:
+    def read(self) -> BodyState:
         for update in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_comVel):
             update(self.model, self.data)
         found, rate, kind = [], np.empty(6), mujoco.mjtObj.mjOBJ_BODY

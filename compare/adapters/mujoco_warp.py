@@ -10,7 +10,7 @@ import numpy as np
 import warp
 
 from compare.adapters import mujoco_free
-from compare.adapters.free import State
+from compare.adapters.free import BodyState
 from compare.adapters.scene import Vector
 from model.kinematics import rotated
 
@@ -48,7 +48,7 @@ class Warp(mujoco_free.Bodies):
         with warp.ScopedDevice("cpu"):
             engine.step(self.model, self.data)
 
-    def read(self) -> State:
+    def read(self) -> BodyState:
         q, v = (np.asarray(each.numpy()[0], float) for each in (self.data.qpos, self.data.qvel))
         return q[-7:-4], v[-6:-3], rotated(q[-4:], v[-3:])
 

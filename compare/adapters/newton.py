@@ -16,7 +16,7 @@ import newton as engine
 import numpy as np
 import warp
 
-from compare.adapters.free import Free, State
+from compare.adapters.free import BodyState, Free
 from compare.adapters.scene import Vector, upright
 from model.arrays import Array
 
@@ -80,7 +80,7 @@ class Newton(Free):
         self.old, self.new = self.new, self.old
         self.old.clear_forces()
 
-    def read(self) -> State:
+    def read(self) -> BodyState:
         place, rate = (
             each.numpy()[self.number].astype(float) for each in (self.old.body_q, self.old.body_qd)
         )

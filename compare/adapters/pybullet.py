@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pybullet as engine
 
-from compare.adapters.free import CORNERS, Free, State, Touch
+from compare.adapters.free import CORNERS, BodyState, Free, Touch
 from compare.adapters.scene import Vector, upright
 from model.arrays import Array
 
@@ -80,7 +80,7 @@ class PyBullet(Free):
     def advance(self) -> None:
         engine.stepSimulation(**self.here)
 
-    def read(self) -> State:
+    def read(self) -> BodyState:
         place, _ = engine.getBasePositionAndOrientation(self.body, **self.here)
         velocity, spin = engine.getBaseVelocity(self.body, **self.here)
         return [each / self.scale for each in place], [each / self.scale for each in velocity], spin

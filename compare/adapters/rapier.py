@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import rapier3d as engine
 
-from compare.adapters.free import CORNERS, Free, State
+from compare.adapters.free import CORNERS, BodyState, Free
 from compare.adapters.scene import Scene, Vector, facing
 from model.arrays import Array
 
@@ -98,7 +98,7 @@ class Rapier(Free):
             )
             self.bodies.append(self.world.add_body(moving, shapes))
 
-    def read(self) -> State:
+    def read(self) -> BodyState:
         own = [self.world.rigid_bodies[body] for body in self.bodies]
         return tuple(
             [v.x, v.y, v.z] for body in own for v in (body.translation, body.linvel, body.angvel)

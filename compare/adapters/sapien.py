@@ -11,7 +11,7 @@ import math
 import warnings
 from typing import Any
 
-from compare.adapters.free import CORNERS, Free, State
+from compare.adapters.free import CORNERS, BodyState, Free
 from compare.adapters.scene import Vector, upright
 from model.arrays import Array
 
@@ -82,7 +82,7 @@ class Sapien(Free):
         self.world.add_entity(entity)
         return entity
 
-    def read(self) -> State:
+    def read(self) -> BodyState:
         return self.entity.pose.p, self.body.linear_velocity, self.body.angular_velocity
 
     def push(self, force: Vector) -> None:

@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from compare.adapters.free import BreakdownError, Free, Library, State, Touch
+from compare.adapters.free import BodyState, BreakdownError, Free, Library, Touch
 from compare.adapters.scene import Vector
 from model import InputError
 from model.versions import ABSENT
@@ -160,7 +160,7 @@ class Siconos(Free):
     def advance(self) -> None:
         self._state = self._ask(list(self._force))
 
-    def read(self) -> State:
+    def read(self) -> BodyState:
         return tuple(self._state)
 
     def push(self, force: Vector) -> None:

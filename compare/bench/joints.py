@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from compare.adapters.free import State
+from compare.adapters.free import BodyState
 from compare.adapters.mujoco_free import Bodies, studied
 from compare.kit.engines import PLAIN
 from compare.kit.tasks import Task, carry_out
@@ -46,7 +46,7 @@ class PlainOnJoints(Bodies):
             self._states[:, 0] += self._begin - self._states[0, 0]
         self._at += n
 
-    def state(self) -> State:
+    def state(self) -> BodyState:
         return tuple(self._states[self._at]) if self._task else super().state()
 
 
