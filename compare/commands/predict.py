@@ -29,24 +29,14 @@ from model.trajectory import AXES
 
 def show_parameters(args: argparse.Namespace) -> int:
     """Show every parameter, with its value in the set asked for, and all sets' names."""
-    p, rows = options.parameters(args), []
+    p, rows, cells = options.parameters(args), [], [["option", "value", "unit", "range", "meaning"]]
     for field in Parameters.quantities():
-        meta, value = field.metadata, getattr(p, field.name)
-        allowed = str(meta["allowed"]).replace("any", "")
-        row = {
-            "option": f"--{field.name.replace('_', '-')}",
-            "symbol": meta["symbol"],
-            "value": value,
-        }
-        rows.append(
-            {"name": field.name}
-            | row
-            | {"unit": meta["unit"], "range": allowed, "meaning": meta["meaning"]}
-        )
-    cells = [["option", "value", "unit", "range", "meaning"]]
-    for row in rows:
-        value, unit = f"{row['value']:.6g}", readable(row["unit"])
-        cells.append([row["option"], value, unit, row["range"], row["meaning"]])
+        about, value = field.metadata, getattr(p, field.name)
+        option, unit = f"--{field.name.replace('_', '-')}", readable(about["unit"])
+        allowed = str(about["allowed"]).replace("any", "")
+        row = {"name": field.name, "option": option, "symbol": about["symbol"], "value": value}
+        rows.append(row | {"unit": about["unit"], "range": allowed, "meaning": about["meaning"]})
+        cells.append([option, f"{value:.6g}", unit, allowed, about["meaning"]])
     cells.append(["--drag", p.drag, "", "", f"law of drag: {', '.join(LAWS)}"])
     shown = pages.table("", cells, justify="left", box=None)
     others = [name for name in Parameters.names() if args.parameters or name != args.set]
@@ -144,47 +134,69 @@ def reading(p: Parameters) -> str:
     )
 
 
+Shown = Callable[[float, int], str]
+"""A number as text, with so many digits at most."""
+
+
 def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
     """What `described` says of p: the reading, thresholds, solutions and what to mind, for the
     terminal.
 
     Where the model is off for a real fluid that comes first, and the numbers have three digits."""
-    off = data["model_error"]
 
-    def to_digits(value: float, most: int) -> str:
-        return meter.rounded(value, off, most)
+    def shown(value: float, most: int) -> str:
+        return meter.rounded(value, data["model_error"], most)
 
-    first = [Text(doubt, "bold yellow") for doubt in model_warning(off)]
-    limits = [["", "value", "what happens there"]]
-    for name, value in data["thresholds"].items():
-        symbol, unit = (QUANTITIES[name].symbol, " rad/s") if name in QUANTITIES else ("η_cr", "")
-        limits.append(
-            [
-                symbol,
-                "does not exist" if math.isnan(value) else f"{to_digits(value, 12)}{unit}",
-                meter.MEANING[name],
-            ]
-        )
-
-    solutions = data["solutions"]
-    rows = [
-        [label, *(show(s, to_digits) for s in solutions)]
-        for label, show in _ROWS.items()
-        if label != "Re" or p.nu_f
+    return [
+        *(Text(doubt, "bold yellow") for doubt in model_warning(data["model_error"])),
+        *_answer(p, data, shown),
+        "",
+        _thresholds(data, shown),
+        _solutions(p, data, shown),
+        *_remarks(p, data),
+        "",
+        *_set(p),
     ]
-    shown = pages.table("Stationary solutions", [["", *(s["case"] for s in solutions)], *rows])
-    attracting = {s.case.name for s in analytic.stable_solutions(p)}
-    for column, s in zip(shown.columns[1:], solutions, strict=True):
-        column.style = "" if s["exists"] and s["case"] in attracting else "dim"
 
-    answer = [Text(f"At ω₀ = {p.omega_0:g} rad/s {data['reading']}.", "bold")]
+
+def _answer(p: Parameters, data: dict[str, Any], shown: Shown) -> list[Text]:
+    """The reading at the flow, and how far the operating range goes."""
     because = data["operating_range_ends"]["because"]
     reach = f"It has no operating range: {because}."
     if limit := data["operating_range"]:
-        reach = f"It rolls with the fluid up to ω₀ = {to_digits(limit, 5)} rad/s: there {because}."
+        reach = f"It rolls with the fluid up to ω₀ = {shown(limit, 5)} rad/s: there {because}."
         if math.isinf(data["reading_range"]):
             reach += " ω_c = ω₀ holds in every motion, however fast the flow."
-    answer.append(Text(reach, "bold"))
+    return [Text(f"At ω₀ = {p.omega_0:g} rad/s {data['reading']}.", "bold"), Text(reach, "bold")]
+
+
+def _thresholds(data: dict[str, Any], shown: Shown) -> Table:
+    """A table of all thresholds."""
+    rows = [["", "value", "what happens there"]]
+    for name, value in data["thresholds"].items():
+        symbol, unit = (QUANTITIES[name].symbol, " rad/s") if name in QUANTITIES else ("η_cr", "")
+        said = "does not exist" if math.isnan(value) else f"{shown(value, 12)}{unit}"
+        rows.append([symbol, said, meter.MEANING[name]])
+    return pages.table("Thresholds", rows, justify="left")
+
+
+def _solutions(p: Parameters, data: dict[str, Any], shown: Shown) -> Table:
+    """A table of all stationary solutions, dim those that attract nothing."""
+    solutions = data["solutions"]
+    rows = [
+        [label, *(show(s, shown) for s in solutions)]
+        for label, show in _ROWS.items()
+        if label != "Re" or p.nu_f
+    ]
+    made = pages.table("Stationary solutions", [["", *(s["case"] for s in solutions)], *rows])
+    attracting = {s.case.name for s in analytic.stable_solutions(p)}
+    for column, s in zip(made.columns[1:], solutions, strict=True):
+        column.style = "" if s["exists"] and s["case"] in attracting else "dim"
+    return made
+
+
+def _remarks(p: Parameters, data: dict[str, Any]) -> list[Text | str]:
+    """What the numbers leave out or don't say."""
     remarks: list[Text | str] = [
         Text("Forces in RR are not determined: shown are those that need least friction.", "dim")
     ]
@@ -201,7 +213,7 @@ def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
         remarks += [f"{inertia}: it would shift {shifts}; not ω₀₃.", meter.AT_WALLS]
     outside = [
         f"{s['Re']:.3g} in {s['case']}"
-        for s in solutions
+        for s in data["solutions"]
         if s["exists"] and s["drag_law_covers_Re"] is False
     ]
     if outside:
@@ -209,16 +221,7 @@ def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
         hint = f" (--drag {SCHILLER_NAUMANN}: up to {most:g})" if p.drag != SCHILLER_NAUMANN else ""
         law = f"the law {p.drag!r} is meant for {low:g} to {high:g}{hint}"
         remarks.append(Text(f"Warning: Re = {', '.join(outside)}, but {law}.", "yellow"))
-    return [
-        *first,
-        *answer,
-        "",
-        pages.table("Thresholds", limits, justify="left"),
-        shown,
-        *remarks,
-        "",
-        *_set(p),
-    ]
+    return remarks
 
 
 def _set(p: Parameters) -> list[Table | Text]:
@@ -232,7 +235,7 @@ def _set(p: Parameters) -> list[Table | Text]:
     return [head, Text(f"κ = c√(R/g) = {p.kappa:.6g}, Ω₀ = ω₀√(R/g) = {p.Omega_0:.6g}", "dim")]
 
 
-def _complex(value: complex, largest: float, shown: Callable[[float, int], str]) -> str:
+def _complex(value: complex, largest: float, shown: Shown) -> str:
     """A complex number and its conjugate; a real part that is round-off is 0."""
     real = value.real if abs(value.real) > 1e-12 * largest else 0.0
     return shown(real, 4) + (f" ± {shown(abs(value.imag), 4)}i" if value.imag else "")
@@ -241,7 +244,7 @@ def _complex(value: complex, largest: float, shown: Callable[[float, int], str])
 _STABILITY = {each.value: each.value.removesuffix(" stable") for each in analytic.Stability} | {
     analytic.Stability.ALGEBRAIC.value: "algebraically"
 }
-_ROWS: dict[str, Callable[[dict[str, Any], Callable[[float, int], str]], str]] = {
+_ROWS: dict[str, Callable[[dict[str, Any], Shown], str]] = {
     "ω_c (rad/s)": lambda s, shown: shown(s["x"]["omega_c"], 8),
     "ω̃_x (rad/s)": lambda s, shown: shown(s["x"]["slip_x"], 8),
     "ω̃_y (rad/s)": lambda s, shown: shown(s["x"]["slip_y"], 8),
