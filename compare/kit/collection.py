@@ -11,7 +11,7 @@ import dataclasses
 import hashlib
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -69,15 +69,7 @@ def collect(
     if not directory.is_dir():
         why = "it is no directory" if directory.exists() else "there is no such directory"
         raise StorageError(f"cannot read {directory}: {why}")
-    files = []
-    for file in sorted(directory.rglob("*.h5")):
-        if output.exists() and file.samefile(output):
-            # what is to be overwritten must be the collection of the last time
-            with reading(output) as before:
-                if before.attrs.get("schema") != SCHEMA:
-                    raise StorageError("it holds runs to be gathered, and can't be the output, too")
-        else:
-            files.append(file)
+    files = list(_files(directory, output))
     shares = [files[k : k + SHARE] for k in range(0, len(files), SHARE)]
     parts, problems = [], list[str]()
     with processes(workers) as work:
@@ -90,36 +82,58 @@ def collect(
         name: np.concatenate([part.pop(name) for part in parts])
         for name in list(parts[0] if parts else ())
     }
-    rows = np.arange(len(table["run"]) if table else 0)
-    if table:  # the first of each identity, and the numbers of that
-        _, first, which = np.unique(table["identity"], return_index=True, return_inverse=True)
-        for k in np.flatnonzero(table["numbers"] != table["numbers"][first[which]]).tolist():
-            those = (directory / table["run"][i] for i in (first[which[k]], k))
-            problems.append(
-                f"{' and '.join(map(str, those))} hold the same run with different numbers"
-            )
-        rows = np.sort(first)
+    rows, twofold = _each_once(table, directory)
+    problems += twofold
     if problems:
         more = f"; and {len(problems) - NAMED} more" if len(problems) > NAMED else ""
         raise StorageError("; ".join(problems[:NAMED]) + more)
     if not table:
         raise StorageError(f"there are no runs in {directory}")
-    collected = {name: values[rows] for name, values in table.items() if name not in _HELD}
-    coordinates, about = varied_parameters(collected), _attributes()
+    _write({name: values[rows] for name, values in table.items() if name not in _HELD}, output)
+    return len(rows)
+
+
+def _files(directory: Path, output: Path) -> Iterator[Path]:
+    """The files of a directory that may hold runs; the output is none, and may be overwritten if it
+    is the collection of the last time."""
+    for file in sorted(directory.rglob("*.h5")):
+        if not (output.exists() and file.samefile(output)):
+            yield file
+            continue
+        with reading(output) as before:
+            if before.attrs.get("schema") != SCHEMA:
+                raise StorageError("it holds runs to be gathered, and can't be the output, too")
+
+
+def _each_once(table: Columns, directory: Path) -> tuple[npt.NDArray[np.int_], list[str]]:
+    """Rows with the first of each run; and which files hold the same run with other numbers."""
+    if not table:
+        return np.empty(0, int), []
+    _, first, which = np.unique(table["identity"], return_index=True, return_inverse=True)
+    names = [directory / name for name in table["run"].tolist()]
+    different = np.flatnonzero(table["numbers"] != table["numbers"][first[which]]).tolist()
+    return np.sort(first), [
+        f"{names[first[which[k]]]} and {names[k]} hold the same run with different numbers"
+        for k in different
+    ]
+
+
+def _write(collected: Columns, output: Path) -> None:
+    """Write runs in the order of what varies: as a grid if they are each point of one once."""
+    coordinates, about, count = varied_parameters(collected), _attributes(), len(collected["run"])
     order = np.lexsort([collected[name] for name in ("run", *reversed(coordinates))])
     collected = {name: values[order] for name, values in collected.items()}
     dimensions, axes = ["run"], {name: np.unique(collected[name]) for name in coordinates}
     shape = [len(values) for values in axes.values()]
-    if axes and math.prod(shape) == len(rows):
+    if axes and math.prod(shape) == count:
         places = [np.searchsorted(values, collected[name]) for name, values in axes.items()]
-        # each point of a grid once
-        if np.array_equal(np.ravel_multi_index(places, shape), np.arange(len(rows))):
+        if np.array_equal(np.ravel_multi_index(places, shape), np.arange(count)):
             dimensions = coordinates
             collected = axes | {
                 name: v.reshape(shape) for name, v in collected.items() if name not in axes
             }
     with WholeFile(output) as whole:
-        title = f"What {len(rows)} balls settled to, measured over the last part of each run"
+        title = f"What {count} balls settled to, measured over the last part of each run"
         whole.file.attrs.update(
             Conventions=CONVENTIONS, title=title, schema=SCHEMA, schema_version=SCHEMA_VERSION
         )
@@ -128,7 +142,6 @@ def collect(
             if dimensions == ["run"] and coordinates and name not in ("run", *coordinates):
                 stored.attrs["coordinates"] = " ".join(coordinates)  # of the CF convention
         whole.finish()
-    return len(rows)
 
 
 def _columns_of_files(directory: Path, files: Sequence[Path]) -> tuple[Columns, list[str]]:
