@@ -12,6 +12,7 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.textpath import text_to_path
 
@@ -69,7 +70,6 @@ def draw_deviations(checks: Checks) -> tuple[Figure, str]:
     every, checks = checks, tuple(filter(_has_tolerance, checks))
     names = list(dict.fromkeys(c.measurement.quantity for c in checks))
     engines = list(dict.fromkeys(c.measurement.engine for c in checks))
-    strip = 1 / len(engines)
     height = 0.75 + len(names) * (0.15 + 0.12 * len(engines)) + 0.25 * (len(engines) > 1)
     figure = Figure(figsize=(_WIDTH, height))
     axes = figure.add_subplot()
@@ -77,6 +77,19 @@ def draw_deviations(checks: Checks) -> tuple[Figure, str]:
         axes.axvspan(_FRAME[0] / 2, band, color=grey, lw=0, zorder=0)
     for k in range(1, len(names)):
         axes.axhline(k - 0.5, color="white", lw=1.5, zorder=0.5)
+    _draw_points(axes, checks, names, engines)
+    axes.set_yticks(range(len(names)), [style.symbol(name) for name in names])
+    label = "|measured − predicted|/tolerance"
+    axes.set(xscale="log", xlim=_FRAME, ylim=(len(names) - 0.5, -0.5), xlabel=label)
+    axes.minorticks_off()  # of which there would be more than marks
+    if len(engines) > 1:
+        style.legend(figure, loc="upper center", ncols=4)
+    _place(axes, height, above=0.33 if len(engines) > 1 else 0.04)
+    return figure, _told_of(every, checks, engines)
+
+
+def _draw_points(axes: Axes, checks: Checks, names: Sequence[str], engines: Sequence[str]) -> None:
+    """Draw a point for each check: rows of quantities, and in each a strip for every engine."""
     row = np.array([names.index(c.measurement.quantity) for c in checks])
     engine = np.array([engines.index(c.measurement.engine) for c in checks])
     # Points are spread vertically against overlap; a single point stays centred.
@@ -84,41 +97,38 @@ def draw_deviations(checks: Checks) -> tuple[Figure, str]:
     spread = np.where(
         np.bincount(kind)[kind] == 1, 0.0, (np.arange(len(row)) * 0.618 + 0.5) % 1 - 0.5
     )
-    lanes = row + strip * (engine + 0.5 + 0.6 * spread) - 0.5
+    lanes = row + 1 / len(engines) * (engine + 0.5 + 0.6 * spread) - 0.5
     parts = np.clip([abs(c.deviation) / c.tolerance for c in checks], *_FRAME)
     agrees = np.array([c.agrees for c in checks])
+    size: dict[str, Any] = {"ms": 3, "mfc": "none"} if len(checks) > _MANY else {"ms": 4.5}
     for k, name in enumerate(engines):
-        for fine, bad in ((agrees, {}), (~agrees, {"color": style.FORCE, "label": f"_{name}"})):
-            own = fine & (engine == k)
-            look = style.mark_of(name) | (
-                {"ms": 3, "mfc": "none"} if len(checks) > _MANY else {"ms": 4.5}
-            )
-            axes.plot(
-                parts[own], lanes[own], ls="none", clip_on=False, **{"label": name} | look | bad
-            )
-    axes.set_yticks(range(len(names)), [style.symbol(name) for name in names])
-    axes.set(
-        xscale="log",
-        xlim=_FRAME,
-        ylim=(len(names) - 0.5, -0.5),
-        xlabel="|measured − predicted|/tolerance",
-    )
-    axes.minorticks_off()  # of which there would be more than marks
-    above = 0.04
-    if len(engines) > 1:
-        style.legend(figure, loc="upper center", ncols=4)
-        above = 0.33
-    # Placed by hand: there are so many of these figures that a solver of layouts would cost more
-    # than drawing them.
-    texts = [(label.get_text(), label.get_fontproperties()) for label in axes.get_yticklabels()]
+        look: dict[str, Any] = (
+            {"label": name, "ls": "none", "clip_on": False} | style.mark_of(name) | size
+        )
+        for own, bad in ((agrees, {}), (~agrees, {"color": style.FORCE, "label": f"_{name}"})):
+            own = own & (engine == k)
+            axes.plot(parts[own], lanes[own], **look | bad)
+
+
+def _place(axes: Axes, height: float, above: float) -> None:
+    """Place the frame of a figure of deviations, with so much above, inches.
+
+    By hand: there are so many of these figures that a solver of layouts would cost more than
+    drawing them."""
     widths = [
-        text_to_path.get_text_width_height_descent(text, font, "$" in text)[0]
-        for text, font in texts
+        text_to_path.get_text_width_height_descent(
+            label.get_text(), label.get_fontproperties(), "$" in label.get_text()
+        )[0]
+        for label in axes.get_yticklabels()
     ]
     left = 0.15 + max(widths) / 72  # points
     axes.set_position(
         (left / _WIDTH, _BELOW / height, 1 - (left + 0.16) / _WIDTH, 1 - (_BELOW + above) / height)
     )
+
+
+def _told_of(every: Checks, checks: Checks, engines: Sequence[str]) -> str:
+    """The caption of a figure of deviations, which shows these of all checks."""
     sets = dict.fromkeys(c.measurement.set for c in checks)
     alone = f"{next(iter(sets))}: {style.named(checks[0].measurement.parameters)}"
     counts = Counter(c.measurement.engine for c in every)
@@ -128,7 +138,7 @@ def draw_deviations(checks: Checks) -> tuple[Figure, str]:
         + (f", of which {shown[name]} have a tolerance" if shown[name] < counts[name] else "")
         for name in engines
     )
-    return figure, (
+    return (
         "By how much what was measured differs from what is predicted, in parts of the tolerance: "
         f"{told} ({f'{len(sets)} parameter sets' if len(sets) > 1 else alone}), a strip for each "
         "quantity, and in it one for each engine. Shaded: within tolerance, three standard "

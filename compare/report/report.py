@@ -96,7 +96,7 @@ def render(
         figures=[figure for figure in apart if not figure["gap"]],
         sections=sections,
         outcomes=sorted({verdict.outcome for verdict in ran}),
-        heard=sorted(
+        beside=sorted(
             {f"{each.engine}: {each.outcome}" for verdict in ran for each in verdict.engines[1:]}
         ),
         wording=wording,
