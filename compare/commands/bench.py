@@ -10,7 +10,7 @@ import re
 import sys
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from compare.kit import pages
 from model import InputError
 from model.files import check_ours, make_directory, write_text
 from model.parameters import check_names
+
+if TYPE_CHECKING:
+    from compare.bench.case import ContactCase
 
 LOOK: Any = {"no_wrap": True, "padding": (0, 1, 0, 0), "pad_edge": False}
 LEAGUE_JSON, LEAGUE_PAGE = "league.json", "league.html"
@@ -152,37 +155,36 @@ def run_cases(args: argparse.Namespace) -> int:
         all_of_them = {"version": VERSION, "cases": [case.to_mapping() for case in own.values()]}
         options.show(chosen.to_mapping() if chosen else all_of_them, True)
         return 0
-    if chosen:
-        about = {
-            "case": chosen.name,
-            "about": chosen.about,
-            "body": _fields(chosen.body),
-            "under it": _fields(chosen.under) + f", between them {chosen.between:g}"
-            if chosen.under
-            else "",
-            "surfaces": "\n".join(map(_fields, chosen.surfaces)),
-            "joint": f"along {_numbers(chosen.joint)}, dry friction {chosen.dry:g} N"
-            if chosen.joint
-            else "",
-            "force": f"m g = {chosen.body.mass * chosen.g:.6g} N down, pull "
-            f"{_numbers(chosen.pull)} N, growth {_numbers(chosen.growth)} N/s, drag "
-            f"{chosen.drag:g} 1/s, flow {chosen.flow:g} rad/s, spring {chosen.spring:g} N/m",
-            "scales": f"{_numbers(chosen.scales)} of position (m), velocity (m/s), spin (rad/s); "
-            f"inf: not compared",
-            "source": f"{chosen.source}; error below {chosen.bound:g}",
-            "notices": "; ".join(
-                f"{why}: {chosen.error(x):.2g}" for why, x in chosen.wrong.items()
-            ),
-            "ends at": f"t = {chosen.times[-1]:g} s: position {_numbers(chosen.exact[-1, :3])} m, "
-            f"velocity "
-            f"{_numbers(chosen.exact[-1, 3:6])} m/s, spin {_numbers(chosen.exact[-1, 6:9])} rad/s",
-            "more": "all states, JSON, HDF5 and MJCF: dualball cases -o DIR",
-        }
-        shown: list[Any] = [pages.pairs({name: text for name, text in about.items() if text})]
-    else:
-        shown = [_table(VERSION, exact.listing())]
-    options.show(None, False, *shown, *([f"written to {args.output}"] if args.output else []))
+    shown = pages.pairs(_told_of(chosen)) if chosen else _table(VERSION, exact.listing())
+    options.show(None, False, shown, *([f"written to {args.output}"] if args.output else []))
     return 0
+
+
+def _told_of(case: ContactCase) -> dict[str, str]:
+    """All that there is to say of an exact case, by headings."""
+    place, velocity, spin = (_numbers(part) for part in np.split(case.exact[-1, :9], 3))
+    weight = f"m g = {case.body.mass * case.g:.6g} N down"
+    pulled = f"pull {_numbers(case.pull)} N, growth {_numbers(case.growth)} N/s"
+    around = f"drag {case.drag:g} 1/s, flow {case.flow:g} rad/s, spring {case.spring:g} N/m"
+    joint = f"along {_numbers(case.joint)}, dry friction {case.dry:g} N" if case.joint else ""
+    under = f"{_fields(case.under)}, between them {case.between:g}" if case.under else ""
+    units = "of position (m), velocity (m/s), spin (rad/s); inf: not compared"
+    told = {
+        "case": case.name,
+        "about": case.about,
+        "body": _fields(case.body),
+        "under it": under,
+        "surfaces": "\n".join(map(_fields, case.surfaces)),
+        "joint": joint,
+        "force": f"{weight}, {pulled}, {around}",
+        "scales": f"{_numbers(case.scales)} {units}",
+        "source": f"{case.source}; error below {case.bound:g}",
+        "notices": "; ".join(f"{why}: {case.error(x):.2g}" for why, x in case.wrong.items()),
+        "ends at": f"t = {case.times[-1]:g} s: position {place} m, velocity {velocity} m/s, "
+        f"spin {spin} rad/s",
+        "more": "all states, JSON, HDF5 and MJCF: dualball cases -o DIR",
+    }
+    return {heading: text for heading, text in told.items() if text}
 
 
 def _table(version: int, rows: list[list[str]]) -> Any:

@@ -11,25 +11,16 @@ from pathlib import Path
 
 from compare.commands import options, running, signals
 from compare.kit import collection, steady, sweep
-from compare.kit.tasks import failed_path, store
+from compare.kit.tasks import Task, failed_path, store
 from compare.view import motions
-from model import Flow, InputError, storage, table
+from model import Flow, InputError, Parameters, storage, table
 from model.files import reading_json, write_text
 
 DURATION = 10.0
 """Of a run, s, unless asked otherwise."""
 _TOLD_APART = (
-    "vary",
-    "random",
-    "seed",
-    "direction",
-    "start",
-    "time",
-    "timestep",
-    "rtol",
-    "restitution",
-    "sample_interval",
-    "means_only",
+    *("vary", "random", "seed", "direction", "start", "time", "timestep", "rtol"),
+    *("restitution", "sample_interval", "means_only"),
 )
 """Options by which sweeps differ, beside engine and parameters."""
 
@@ -61,42 +52,11 @@ def run(args: argparse.Namespace) -> int:
 
 def run_sweep(args: argparse.Namespace) -> int:
     """Carry out the runs that are not done yet and say which failed."""
-    p, axes = options.parameters(args), sweep.Axis.several(args.vary)
-    if args.direction != "held":
-        if len(axes) != 1 or axes[0].name != "omega_0":
-            why = f"direction = {args.direction!r} sweeps omega_0 within one run"
-            raise InputError(f"{why}: vary omega_0 and nothing else")
-        up = sorted(axes[0].points)
-        omegas = {"up": up, "down": up[::-1], "both": up + up[-2::-1]}[args.direction]
-        flow, lasts = Flow.staircase(omegas, args.time), args.time * len(omegas)
-        tasks = [running.task(args, p.replace(omega_0=omegas[0]), flow=flow, t_end=lasts)]
-    else:
-        sets = (
-            sweep.grid(p, axes)
-            if args.random is None
-            else sweep.random(p, axes, args.random, args.seed)
-        )
-        tasks = [running.task(args, each) for each in sets]  # each with settings that suit its set
+    p = options.parameters(args)
+    tasks = _sweep_tasks(args, p)
     save = collection.save_means if args.means_only else storage.save_batch
     with running.campaign(args, "sweep", batch=args.batch, save=save) as work:
-        asked = (
-            {name: getattr(args, name) for name in _TOLD_APART}
-            | {"engine": args.engine.name}
-            | dataclasses.asdict(p)
-        )
-        # `collect` would mix another one with this
-        if (path := args.output / "sweep.json").exists():
-            with reading_json(path, "sweep") as held:
-                held = asked | held  # one of an earlier version lacks some
-                differ = [
-                    f"{name} = {held[name]}, not {value}"
-                    for name, value in asked.items()
-                    if held[name] != value
-                ]
-            if differ:
-                other = f"{args.output} holds another sweep ({'; '.join(differ)})"
-                raise InputError(f"{other}: choose another directory with --output")
-        write_text(path, json.dumps(asked))
+        _refuse_another_sweep(args, p)
         longest, slowest = steady.enough([each.parameters for each in tasks])
         if args.time < longest:
             options.warn(
@@ -108,17 +68,52 @@ def run_sweep(args: argparse.Namespace) -> int:
     whole = len(tasks) - len(failures)
     if args.json:
         summary = {"directory": str(args.output), "runs": len(tasks), "whole": whole}
-        options.show(
-            summary | {"failures": [failure.described() for failure in failures]}, args.json
-        )
+        failed = [failure.described() for failure in failures]
+        options.show(summary | {"failures": failed}, args.json)
     else:
-        print(
-            f"{whole} of {len(tasks)} runs are whole, in {args.output}; gather them with: ", end=""
-        )
-        print(f"dualball collect {args.output}")
+        done = f"{whole} of {len(tasks)} runs are whole, in {args.output}"
+        print(f"{done}; gather them with: dualball collect {args.output}")
         for failure in failures:
             print(f"failed: {failure.task.key}: {failure.reason}", file=sys.stderr)
     return 1 if failures else 0
+
+
+def _sweep_tasks(args: argparse.Namespace, p: Parameters) -> list[Task]:
+    """The runs of a sweep: one for each point, or a single one through all flows."""
+    axes = sweep.Axis.several(args.vary)
+    if args.direction == "held":
+        sets = (
+            sweep.grid(p, axes)
+            if args.random is None
+            else sweep.random(p, axes, args.random, args.seed)
+        )
+        return [running.task(args, each) for each in sets]  # each with settings that suit its set
+    if len(axes) != 1 or axes[0].name != "omega_0":
+        why = f"direction = {args.direction!r} sweeps omega_0 within one run"
+        raise InputError(f"{why}: vary omega_0 and nothing else")
+    up = sorted(axes[0].points)
+    omegas = {"up": up, "down": up[::-1], "both": up + up[-2::-1]}[args.direction]
+    flow, lasts = Flow.staircase(omegas, args.time), args.time * len(omegas)
+    return [running.task(args, p.replace(omega_0=omegas[0]), flow=flow, t_end=lasts)]
+
+
+def _refuse_another_sweep(args: argparse.Namespace, p: Parameters) -> None:
+    """Note in the directory which sweep it holds; `InputError` if that is another one, with which
+    `collect` would mix this."""
+    asked = {name: getattr(args, name) for name in _TOLD_APART}
+    asked |= {"engine": args.engine.name} | dataclasses.asdict(p)
+    if (path := args.output / "sweep.json").exists():
+        with reading_json(path, "sweep") as held:
+            held = asked | held  # one of an earlier version lacks some
+            differ = [
+                f"{name} = {held[name]}, not {value}"
+                for name, value in asked.items()
+                if held[name] != value
+            ]
+        if differ:
+            other = f"{args.output} holds another sweep ({'; '.join(differ)})"
+            raise InputError(f"{other}: choose another directory with --output")
+    write_text(path, json.dumps(asked))
 
 
 def collect(args: argparse.Namespace) -> int:
