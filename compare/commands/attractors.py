@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import itertools
 import shlex
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -32,47 +32,32 @@ def run(args: argparse.Namespace) -> int:
     """Find the attractors of every set of parameters, and show them."""
     axes, ways = map(Axis.several, (args.vary, args.follow))
     ranges = {way.name: way.ends for way in ways}
-    starts = np.array([running.start(args)]) if args.start else args.random
-
-    def simulate(p: Parameters, x0s: Array, duration: float, interval: float) -> list[Trajectory]:
-        lasting = {"t_end": duration, "sample_interval": interval}
-        return [carry_out(running.task(args, p, x0=State.of(x0), **lasting)) for x0 in x0s]
-
-    rows = []
     sets = list(grid(options.parameters(args), axes))
+    rows = []
     for k, p in enumerate(sets):
-        usual = args.engine is EVENT and running.settings(args, p) == EVENT.configure({}, p)
-        own: dict[str, Any] = {} if usual else {"run": simulate}
 
         def tell(done: float, k: int = k) -> None:
             args.tell((k + done) / len(sets))
 
-        attractors = analytic.attractors(
-            p, starts, seed=args.seed, lasting=args.time, progress=tell, **own
-        )
-        orbits = [each.limit.orbit for each in attractors if each.limit.orbit]
+        found = _attractors(args, p, tell)
         branches = [
-            orbit_branch.follow(orbit, name, *ends)
-            for orbit in orbits
+            orbit_branch.follow(each.limit.orbit, name, *ends)
+            for each in found
+            if each.limit.orbit
             for name, ends in ranges.items()
         ]
-        row: dict[str, Any] = {axis.name: getattr(p, axis.name) for axis in axes}
-        row |= {
-            "attractors": list(map(attractor_data, attractors)),
-            "branches": list(map(branch_data, branches)),
-        }
-        rows.append(row)
+        varied: dict[str, Any] = {axis.name: getattr(p, axis.name) for axis in axes}
+        attracting, born = list(map(attractor_data, found)), list(map(branch_data, branches))
+        rows.append(varied | {"attractors": attracting, "branches": born})
     data = plain({"engine": args.engine.name, "seed": args.seed, "sets": rows})
     table = _table(data)
     if args.page:
-        write_text(
-            args.page,
-            _page(args.page.stem.capitalize(), args.words, options.parameters(args), data, table),
-        )
+        title = args.page.stem.capitalize()
+        write_text(args.page, _page(title, args.words, options.parameters(args), data, table))
     title, lines = f"What balls come to ({args.engine.name})", []
-    for branch in itertools.chain.from_iterable(each["branches"] for each in data["sets"]):
+    for branch in _branches(data):
         name = branch["parameter"]
-        values = [orbit[branch["parameter"]] for orbit in branch["orbits"]]
+        values = [orbit[name] for orbit in branch["orbits"]]
         lines.append(
             f"Followed in {name}, {len(values)} orbits from {min(values):.6g} to {max(values):.6g}:"
         )
@@ -82,6 +67,26 @@ def run(args: argparse.Namespace) -> int:
         ]
     options.show(data, args.json, pages.table(title, table, caption="\n".join(lines)))
     return 0
+
+
+def _attractors(
+    args: argparse.Namespace, p: Parameters, tell: Callable[[float], None]
+) -> list[Attractor]:
+    """The attractors of a set of parameters: by theory, or by the runs of another engine."""
+
+    def simulate(p: Parameters, x0s: Array, duration: float, interval: float) -> list[Trajectory]:
+        lasting = {"t_end": duration, "sample_interval": interval}
+        return [carry_out(running.task(args, p, x0=State.of(x0), **lasting)) for x0 in x0s]
+
+    starts = np.array([running.start(args)]) if args.start else args.random
+    usual = args.engine is EVENT and running.settings(args, p) == EVENT.configure({}, p)
+    own: dict[str, Any] = {} if usual else {"run": simulate}
+    return analytic.attractors(p, starts, seed=args.seed, lasting=args.time, progress=tell, **own)
+
+
+def _branches(data: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """The branches of orbits of all sets."""
+    return itertools.chain.from_iterable(each["branches"] for each in data["sets"])
 
 
 def attractor_data(of: Attractor) -> dict[str, Any]:
@@ -183,37 +188,20 @@ def _page(
     lines = [f"# {title}: what balls come to", ""]
     lines += [f"Parameters, unless a table says otherwise: {given}; drag: {p.drag}. Written by", ""]
     lines += ["```sh", shlex.join(words), "```", "", pages.markdown(table)]
-    for branch in itertools.chain.from_iterable(each["branches"] for each in data["sets"]):
+    for branch in _branches(data):
         name = branch["parameter"]
         symbol = symbols[name]
         lines += ["", f"## Followed in {symbol}", ""]
         lines += [
-            *(
-                f"* {p['kind']} at {symbol} = {p['value']:.6g} {p['reason']}".rstrip()
-                for p in branch["places"]
-            )
+            f"* {place['kind']} at {symbol} = {place['value']:.6g} {place['reason']}".rstrip()
+            for place in branch["places"]
         ]
-        rows = [
-            [
-                symbol,
-                "period (s)",
-                "mean ω_c (rad/s)",
-                "height (mm)",
-                "largest |multiplier|",
-                "stable",
-            ]
-        ]
+        head = "period (s)", "mean ω_c (rad/s)", "height (mm)", "largest |multiplier|", "stable"
+        rows = [[symbol, *head]]
         for orbit in branch["orbits"]:
-            numbers = (
-                orbit[name],
-                orbit["period"],
-                orbit["omega_c"],
-                1e3 * orbit["height"],
-                _largest(orbit),
-            )
-            rows.append(
-                [*(f"{number:.7g}" for number in numbers), "yes" if orbit["stable"] else "no"]
-            )
+            size, stable = 1e3 * orbit["height"], "yes" if orbit["stable"] else "no"
+            numbers = orbit[name], orbit["period"], orbit["omega_c"], size, _largest(orbit)
+            rows.append([*(f"{number:.7g}" for number in numbers), stable])
         lines += ["", pages.markdown(rows)]
     return "\n".join(lines) + "\n"
 
