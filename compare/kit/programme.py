@@ -198,7 +198,7 @@ def carry_out(job: Job, before: Records) -> Records:
     label = f"{protocol.name}-{path.parent.name}"
     campaign = job.runner.campaign.part(label, job.name)
     if not path.exists():
-        runner = replace(job.runner, engine=job.by, campaign=campaign)
+        runner = replace(job.runner, engine=job.by, campaign=campaign, protocol=protocol.name)
         strong, rows = dict(job.sets), list[Measurement | Missing]()
         for name, p in job.sets.items():
             weak = UNDAMPED if p.c == 0 else ""

@@ -18,15 +18,13 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple, Unpack, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from compare.kit.conditions import Conditions
 from compare.kit.quantities import quantity
-from compare.kit.runner import Runner
 from compare.kit.statistics import Estimate
-from compare.kit.tasks import Task
 from model import Case, Parameters, StorageError
 from model.hdf5 import WholeFile, column, dataset, reading, write_columns
 from model.kinematics import VARIABLES
@@ -84,32 +82,6 @@ class Measurement:
     def finite(self) -> bool:
         """Whether it is a number with an uncertainty, and neither is nan or infinite."""
         return math.isfinite(self.value) and math.isfinite(self.uncertainty)
-
-
-def measurement(
-    runner: Runner,
-    protocol: str,
-    set: str,
-    p: Parameters,
-    quantity: str,
-    value: Estimate | float,
-    tasks: Iterable[Task] = (),
-    **at: Unpack[Conditions],
-) -> Measurement:
-    """A measurement by the runner's engine; a plain number is exact."""
-    sure = value if isinstance(value, Estimate) else Estimate(float(value), 0.0)
-    return Measurement(
-        protocol=protocol,
-        quantity=quantity,
-        value=sure.value,
-        uncertainty=sure.uncertainty,
-        budget=sure.budget,
-        engine=runner.engine.name,
-        set=set,
-        parameters=p,
-        at=at,
-        runs=tuple(task.key for task in tasks),
-    )
 
 
 def if_found(row: Measurement, why: str) -> Measurement | Missing:

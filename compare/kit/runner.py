@@ -1,19 +1,24 @@
-"""What a protocol works with: an engine, a campaign of runs, and how much is measured."""
+"""What a protocol works with: an engine, a campaign of runs, and how much is measured; and what it
+hands in."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Unpack
 
 import numpy as np
 import numpy.typing as npt
 
 from compare.kit import levels
 from compare.kit.campaign import Campaign
+from compare.kit.conditions import Conditions
 from compare.kit.engines import Engine
 from compare.kit.levels import Level, Sampling
+from compare.kit.record import Measurement, Missing
 from compare.kit.scales import time_unit
+from compare.kit.statistics import Estimate
 from compare.kit.tasks import Task
 from model import Flow, Parameters, Trajectory
 
@@ -27,6 +32,8 @@ class Runner:
     level: Level
     divisor: int = 1
     """Time steps in one that a protocol asks for, see `Engine.divisors`."""
+    protocol: str = ""
+    """The name of the protocol that is carried out."""
 
     @property
     def sampling(self) -> Sampling:
@@ -65,6 +72,34 @@ class Runner:
             settings=self.engine.at(step / self.divisor, p),
             sample_interval=max(step, t_end / samples),
         )
+
+    def measurement(
+        self,
+        set: str,
+        p: Parameters,
+        quantity: str,
+        value: Estimate | float,
+        tasks: Iterable[Task] = (),
+        **at: Unpack[Conditions],
+    ) -> Measurement:
+        """A measurement by the engine, from these runs; a plain number is exact."""
+        sure = value if isinstance(value, Estimate) else Estimate(float(value), 0.0)
+        return Measurement(
+            protocol=self.protocol,
+            quantity=quantity,
+            value=sure.value,
+            uncertainty=sure.uncertainty,
+            budget=sure.budget,
+            engine=self.engine.name,
+            set=set,
+            parameters=p,
+            at=at,
+            runs=tuple(task.key for task in tasks),
+        )
+
+    def missing(self, set: str, reason: str, rows: int = 1) -> Missing:
+        """What the protocol could not measure, see `Missing`."""
+        return Missing(self.protocol, set, reason, rows)
 
     def groups(self, groups: Sequence[Sequence[Task]]) -> Iterator[list[Trajectory] | str]:
         """The trajectories of each group, or why one failed; held in memory one by one."""

@@ -6,13 +6,13 @@ tapered window is free of it. Three overlapping windows show how far the mean st
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from compare.kit.quantities import quantity
-from compare.kit.record import Measured, Missing, Records, measurement
+from compare.kit.record import Measured, Records
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import dragged_speed
 from compare.kit.statistics import COVERAGE, Estimate, estimate, steady_mean
@@ -66,6 +66,10 @@ class SteadyState:
     excess: float = math.inf
     """Drift or swing divided by its limit for a comparison with theory."""
     failure: str = ""
+
+    def settled_in(self, *cases: Case) -> bool:
+        """Whether it counts as settled, in one of these cases."""
+        return not self.failure and self.case in cases
 
 
 @dataclass(frozen=True)
@@ -235,23 +239,23 @@ def with_changes(
     )
 
 
-def settled_readings(runner: Runner, protocol: str, starts: Sequence[Start]) -> Measured:
+def settled_readings(runner: Runner, starts: Sequence[Start]) -> Measured:
     """Case and omega_c to which the ball settles from each start, with half the step, too."""
     parts = runner.sampling.settled_divisor
     criteria = SettlingCriteria(sharp=runner.sampling.settled_sharp, divisor=parts)
     states = settle(runner, starts, criteria)
-    yield from (Missing(protocol, each.start.set, each.failure) for each in states if each.failure)
+    yield from (runner.missing(each.start.set, each.failure) for each in states if each.failure)
     states = [each for each in states if not each.failure]
     for coarse, fine in zip(states, settle_finer(runner, states, criteria), strict=True):
         p, name = fine.start.p, fine.start.set
-        yield measurement(runner, protocol, name, p, "case", coarse.case, [coarse.task])
+        yield runner.measurement(name, p, "case", coarse.case, [coarse.task])
         if why := not_found_again(coarse, fine):
-            yield Missing(protocol, name, why)
+            yield runner.missing(name, why)
             continue
         read, size = fine.values["omega_c"], quantity("omega_c").size(p)
         change = abs(coarse.values["omega_c"].value - read.value)
         read = with_changes(read, change, p, size, parts**2)
-        yield measurement(runner, protocol, name, p, "omega_c", read, [fine.task])
+        yield runner.measurement(name, p, "omega_c", read, [fine.task])
 
 
 def duration(p: Parameters, span: float = SPAN) -> float:
@@ -282,6 +286,11 @@ def initial_condition(set: str, p: Parameters, how: str) -> Start:
         how,
         State(y=safe_height(p) if how == "on the wall" else 0.0, omega_c=orbit).stacked(),
     )
+
+
+def starts_at(set: str, p: Parameters, how: str, flows: Iterable[float]) -> list[Start]:
+    """An `initial_condition` at each of several flows, rad s-1."""
+    return [initial_condition(set, p.replace(omega_0=flow), how) for flow in flows]
 
 
 def forces(A: Array, B: Array) -> dict[str, Array]:

@@ -13,7 +13,7 @@ from typing import Any, Unpack
 import numpy as np
 
 from compare.kit.conditions import Conditions
-from compare.kit.record import Measurement, Missing, measurement
+from compare.kit.record import Measurement, Missing
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.statistics import Estimate, uniform
@@ -59,7 +59,7 @@ class StepPair(Start):
 class StepPairResult:
     """What was read from a pair with each time step."""
 
-    protocol: str
+    runner: Runner
     pair: StepPair
     tasks: Sequence[Task] = field(repr=False)
     """The runs, those with the coarsest step first."""
@@ -76,19 +76,17 @@ class StepPairResult:
         """What was read with the finest step."""
         return self.reads[-1]
 
-    def row(
-        self, runner: Runner, quantity: str, value: Estimate | float, **at: Unpack[Conditions]
-    ) -> Measurement:
+    def row(self, quantity: str, value: Estimate | float, **at: Unpack[Conditions]) -> Measurement:
         """A measurement of this pair."""
         pair, at = self.pair, self.pair.at | at
-        return measurement(
-            runner, self.protocol, pair.set, pair.p, quantity, value, self.tasks, **at
-        )
+        return self.runner.measurement(pair.set, pair.p, quantity, value, self.tasks, **at)
+
+    def missing(self, why: str) -> Missing:
+        """All measurements of this pair as missing, and why."""
+        return self.runner.missing(self.pair.set, why, self.pair.rows)
 
 
-def carry_out(
-    runner: Runner, protocol: str, pairs: Iterable[StepPair]
-) -> Iterator[StepPairResult | Missing]:
+def carry_out(runner: Runner, pairs: Iterable[StepPair]) -> Iterator[StepPairResult | Missing]:
     """Run all pairs, and read each; or say which of its runs broke down."""
     tasks: list[tuple[StepPair, list[Task]]] = []
     for pair in pairs:
@@ -100,11 +98,11 @@ def carry_out(
                 tasks[-1][1].append(task)
     for (pair, own), runs in zip(tasks, runner.groups([own for _, own in tasks]), strict=True):
         if isinstance(runs, str):
-            yield Missing(protocol, pair.set, f"{pair.name}: the run {runs}", pair.rows)
+            yield runner.missing(pair.set, f"{pair.name}: the run {runs}", pair.rows)
         else:
             each = len(runs) // len(pair.divisors)
             reads = [pair.read(*runs[k : k + each]) for k in range(0, len(runs), each)]
-            yield StepPairResult(protocol, pair, own, reads)
+            yield StepPairResult(runner, pair, own, reads)
 
 
 EXTRAPOLATION, DOUBT = 1 / 2, 1 / math.sqrt(12)

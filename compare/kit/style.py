@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Sequence
+from itertools import pairwise
 from typing import Any, TypeVar
 
 import numpy as np
@@ -54,6 +55,10 @@ POINT: dict[str, Any] = {"color": "black", "marker": "o", "ms": 4.5, "ls": "none
 """A special point."""
 HALO: dict[str, Any] = {"boxstyle": "round,pad=0.12", "fc": "white", "ec": "none", "alpha": 0.85}
 """Background of a name that stands on lines."""
+NAME: dict[str, Any] = {"textcoords": "offset points", "fontsize": 9, "bbox": HALO}
+"""How a name is written beside what it names."""
+MEASURED: dict[str, Any] = {"ms": 5, "capsize": 2.5, "elinewidth": 1, "zorder": 4, "ls": "none"}
+"""Measured points, with bars."""
 SYMBOLS = {"mu": "μ", "eta": "η", "j": "j", "kappa": "κ", "omega_0": "ω₀"}
 THRESHOLD_LINES: dict[str, tuple[str, Line]] = {
     "omega_01": (COLOURS[Case.RR], "-"),
@@ -101,12 +106,8 @@ def symbol(name: str) -> str:
 
     def typeset(match: re.Match[str]) -> str:
         letter, tilde, index, zero = match.groups()
-        return (
-            "$"
-            + (rf"\tilde{{{letter}}}" if tilde else letter)
-            + f"_{{{index}}}"
-            + ("^0$" if zero else "$")
-        )
+        letter = rf"\tilde{{{letter}}}" if tilde else letter
+        return f"${letter}_{{{index}}}{'^0' if zero else ''}$"
 
     text = QUANTITIES[name].symbol if name in QUANTITIES else _COLUMNS[name]
     return re.sub(r"(\w)(\u0303?)_(\w+?)(⁰?)(?!\w)", typeset, text)
@@ -123,9 +124,8 @@ def named(p: Parameters, *names: str) -> str:
         f"{SYMBOLS[name]} = {getattr(p, name):.3g}" for name in names or ("mu", "eta", "j", "kappa")
     ]
     if p.drag != STOKES:
-        values.append(
-            f"{p.drag} drag with Re = {2 * p.r * math.sqrt(p.g * p.R) / p.nu_f:.3g} at √(gR)"
-        )
+        Re = 2 * p.r * math.sqrt(p.g * p.R) / p.nu_f
+        values.append(f"{p.drag} drag with Re = {Re:.3g} at √(gR)")
     return ", ".join(values)
 
 
@@ -138,26 +138,20 @@ def marks(states: Sequence[Measurement]) -> str:
     """The part of a caption that explains the marks of measured points, if any."""
     if not states:
         return ""
-    between = any(m.protocol == "edge" for m in states)
-    said = (
-        " On the unstable SS: the edge between two motions, which the engine was made to follow."
-        if between
-        else ""
-    )
-    said += (
-        f" Marks: measured ({len(states)}); bars: three standard uncertainties, hidden where the "
-        "mark is larger."
-    )
+    said = ""
+    if any(m.protocol == "edge" for m in states):
+        said += " On the unstable SS: the edge between two motions, which the engine was made to"
+        said += " follow."
+    said += f" Marks: measured ({len(states)}); bars: three standard uncertainties, hidden where"
+    said += " the mark is larger."
     most = max(abs(m.value) for m in states)
     if any(COVERAGE * m.uncertainty > LONGEST_BAR * most for m in states):
         said += f" Pale: known to no better than {LONGEST_BAR:.0%} of the axis, without a bar."
     if alone := dict.fromkeys(m.engine for m in states if ENGINES[m.engine].divisors != (1,)):
         steps = sorted({500 * coarse_step(m.parameters) for m in states if m.engine in alone})
         at = " or ".join(f"{step:g}" for step in steps)
-        said += (
-            f" {' and '.join(alone)}: as measured with a time step of {at} ms, not in the "
-            "zero-step limit."
-        )
+        said += f" {' and '.join(alone)}: as measured with a time step of {at} ms, not in the"
+        said += " zero-step limit."
     return said
 
 
@@ -202,9 +196,8 @@ def curve(
         if not way[-1]:  # there is nothing to name
             return
         k = int(np.searchsorted(way, at * way[-1]))
-        here_x, here_y = points[k + 1] - (way[k] - at * way[-1]) / steps[k] * (
-            points[k + 1] - points[k]
-        )
+        back = (way[k] - at * way[-1]) / steps[k]
+        here_x, here_y = points[k + 1] - back * (points[k + 1] - points[k])
         beside(axes, here_x, here_y, text, offset, COLOURS[cases[-1]]).set_label(label)
 
 
@@ -223,44 +216,25 @@ def beside(
     colour: str = "k",
 ) -> Text:
     """Write a name beside a point or curve, `offset` in points; far off with a line."""
-    leader = (
-        {"arrowstyle": "-", "lw": 0.7, "color": "0.4", "shrinkB": 1}
-        if math.hypot(*offset) > 16
-        else None
-    )
+    leader = {"arrowstyle": "-", "lw": 0.7, "color": "0.4", "shrinkB": 1}
     ha = "center" if offset[0] == 0 else "left" if offset[0] > 0 else "right"
     va = "center" if offset[1] == 0 else "bottom" if offset[1] > 0 else "top"
-    look: dict[str, Any] = {
-        "color": colour,
-        "arrowprops": leader,
-        "zorder": 6,
-        "ha": ha,
-        "va": va,
-        "fontsize": 9,
-    }
-    return axes.annotate(text, (x, y), xytext=offset, textcoords="offset points", bbox=HALO, **look)
+    look = NAME | {"color": colour, "zorder": 6, "ha": ha, "va": va}
+    arrow = leader if math.hypot(*offset) > 16 else None
+    return axes.annotate(text, (x, y), xytext=offset, arrowprops=arrow, **look)
 
 
 def guides(axes: Axes, values: dict[str, float]) -> None:
     """Draw dotted lines at thresholds, rad s-1, named at the foot, or one line higher."""
     low, high = axes.get_xlim()
     last, step = -math.inf, 0
-    look: dict[str, Any] = {
-        "xytext": (2, 0),
-        "textcoords": "offset points",
-        "fontsize": 9,
-        "bbox": HALO,
-    }
+    look = NAME | {"xytext": (2, 0), "xycoords": ("data", "axes fraction"), "color": "0.25"}
     for key, value in sorted(values.items(), key=lambda item: item[1]):
         if low <= value <= high:
             step = step + 1 if value - last < 0.08 * (high - low) else 0
             last = value
             axes.axvline(value, **GUIDE)
-            foot: dict[str, Any] = {
-                "xy": (value, 0.02 + 0.07 * step),
-                "xycoords": ("data", "axes fraction"),
-            }
-            axes.annotate(THRESHOLD_LABELS[key], **foot, **look, color="0.25", zorder=0.5)
+            axes.annotate(THRESHOLD_LABELS[key], (value, 0.02 + 0.07 * step), **look, zorder=0.5)
 
 
 def mark_of(engine: str) -> dict[str, Any]:
@@ -297,25 +271,15 @@ def points(
         axes.update_datalim([(x(m), unit * y(m))])
     longest = LONGEST_BAR * axes.dataLim.height
     for engine, own in by_engine(rows, lambda m: m.engine).items():
-        usual = {
-            "ms": 5,
-            "label": engine + way,
-            "capsize": 2.5,
-            "elinewidth": 1,
-            "zorder": 4,
-            "ls": "none",
-        }
         for pale in (False, True):
             shown = [m for m in own if (COVERAGE * unit * m.uncertainty > longest) == pale]
             bars = [math.nan if pale else COVERAGE * unit * m.uncertainty for m in shown]
-            faint: dict[str, Any] = (
-                {"alpha": 0.4} | ({"label": f"_{engine}{way}"} if len(shown) < len(own) else {})
-                if pale
-                else {}
-            )
-            places = [x(m) for m in shown], [unit * y(m) for m in shown]
+            named = not pale or len(shown) == len(own)
+            usual = mark_of(engine) | MEASURED | {"label": f"{'' if named else '_'}{engine}{way}"}
+            usual |= {"alpha": 0.4} if pale else {}
             if shown:
-                axes.errorbar(*places, bars, **mark_of(engine) | usual | faint | look)
+                places = [x(m) for m in shown], [unit * y(m) for m in shown]
+                axes.errorbar(*places, bars, **usual | look)
 
 
 def legend(of: Axes | Figure, **where: Any) -> None:
@@ -325,11 +289,9 @@ def legend(of: Axes | Figure, **where: Any) -> None:
         handles, labels = axes.get_legend_handles_labels()
         once |= dict(zip(labels, handles, strict=True))
     if once:
-        usual = (
-            {"frameon": False, "fontsize": 8}
-            if isinstance(of, Figure)
-            else {"framealpha": 0.95, "fontsize": 8.5}
-        )
+        outside = isinstance(of, Figure)
+        usual: dict[str, Any] = {"frameon": False} if outside else {"framealpha": 0.95}
+        usual["fontsize"] = 8 if outside else 8.5
         of.legend(list(once.values()), list(once), **usual | where)
 
 
@@ -343,11 +305,9 @@ def ground(
 ) -> None:
     """Shade each stretch of a span of time in the colour of its case, and name it above where there
     is room, else in the legend."""
-    begins = [
-        (run.cases[0], run.time[0]),
-        *zip(map(Case, run.events.to_case), run.events.time, strict=True),
-    ]
-    for (case, first), (_, last) in zip(begins, [*begins[1:], (None, run.time[-1])], strict=True):
+    cases = [run.cases[0], *map(Case, run.events.to_case)]
+    bounds = [run.time[0], *run.events.time, run.time[-1]]
+    for case, (first, last) in zip(cases, pairwise(bounds), strict=True):
         low, high = max(first, span[0]), min(last, span[1])
         if low < high:
             x = unit * (np.array([low, high]) - origin)
@@ -355,14 +315,8 @@ def ground(
             name = case.name if named and not wide else None
             axes.axvspan(*x, color=COLOURS[case], alpha=0.15, lw=0, label=name)
             if named and wide:
-                axes.text(
-                    x.mean(),
-                    1.02,
-                    case.name,
-                    transform=axes.get_xaxis_transform(),
-                    ha="center",
-                    fontsize=8,
-                )
+                above: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "ha": "center"}
+                axes.text(x.mean(), 1.02, case.name, **above, fontsize=8)
 
 
 def deviations(

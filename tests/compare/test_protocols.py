@@ -141,8 +141,9 @@ def test_a_mean_may_depend_on_more_than_the_state(runner):
     early, late = (theory.mean_error(p, a, f, leave_rolling=rule) for rule in rules)
     assert late - early > 0.015 * abs(early)
     begin = theory.swing(p, a, f, 0.0)[0] - p.omega_0
-    driven = unsteady.Pulsation("design-5", p, f, a, reach=1.0, lead=float(begin) / a)
-    (row,) = unsteady.mean_errors(replace(runner, level=Level.DEFAULT), [(driven, a)])
+    runner = replace(runner, level=Level.DEFAULT)
+    driven = unsteady.Pulsation(runner, "design-5", p, f, a, reach=1.0, lead=float(begin) / a)
+    (row,) = unsteady.mean_errors(runner, [(driven, a)])
     assert COVERAGE * row.uncertainty > QUANTITIES["mean_error"].resolution * 0.9 * abs(row.value)
 
 
@@ -544,6 +545,7 @@ def test_an_end_that_cannot_be_extrapolated_is_missing_and_no_finding(runner, mo
         for start, case in (("rest", floor), ("with the fluid", floor), ("on the wall", wall)):
             at = {"start": start, "case": case.name}
             rows.append(measured("settled", "case", float(case), 0.0, q, "thick-fluid", **at))
+    runner = replace(runner, protocol="thresholds")
     records = Records.of(thresholds.measure(runner, {"thick-fluid": p}, Records(tuple(rows))))
     assert any("points to no flow at which it ends" in each.reason for each in records.missing)
     # An end is seen, and no smooth one.

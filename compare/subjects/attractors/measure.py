@@ -27,7 +27,7 @@ from compare.kit.conditions import Conditions, state_of
 from compare.kit.engines import MOREAU
 from compare.kit.programme import Protocol
 from compare.kit.quantities import QUANTITIES
-from compare.kit.record import Measured, Missing, Records, Sets, if_found, measurement
+from compare.kit.record import Measured, Missing, Records, Sets, if_found
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.settling import settled_readings
@@ -49,8 +49,8 @@ MEASURED = 3.0
 """The last part of a held flow that is measured, s."""
 DISTURBED = 2.0
 """The first part of it, in which disturbances are not yet linear, s."""
-HOPS_DIVISORS = (16, 32)
-"""Time steps in a coarse one."""
+HOPS_DIVISORS, STEPPED_DIVISORS = (16, 32), (40, 80)
+"""Time steps in a coarse one; by time stepping."""
 SAMPLE = 1e-3
 """Time between samples, s: a parabola through three gives a top to 1e-6 of the height."""
 FOLLOWED = 10.0
@@ -63,27 +63,28 @@ SWUNG = 4.0
 """The last part of a swing that is measured, s."""
 
 
-def hopping(
-    runner: Runner,
-    sets: Sets,
-    records: Records,
-    protocol: str = "recurrent",
-    divisors: tuple[int, int] = HOPS_DIVISORS,
-) -> Measured:
+def recurrent(runner: Runner, sets: Sets, records: Records) -> Measured:
+    """Hops at flows that fall in steps."""
+    return _hopping(runner, runner.sampling.recurrent_flows, HOPS_DIVISORS)
+
+
+def stepped(runner: Runner, sets: Sets, records: Records) -> Measured:
+    """Hops at the flow of the set by time stepping, in which slip begins and turns at whole steps
+    only."""
+    return _hopping(runner, (1.0,), STEPPED_DIVISORS)
+
+
+def _hopping(runner: Runner, shares: Sequence[float], divisors: tuple[int, int]) -> Measured:
     """Period, orbit, height, shrinking of disturbances by flow, and where hopping begins.
 
-    With the protocol "stepped" at the flow of the set only, by time stepping, in which slip begins
-    and turns at whole steps only."""
+    At flows that are these shares of that of the set, with so many time steps in a coarse one."""
     p = Parameters.named(SET)
-    flows = [
-        share * p.omega_0
-        for share in (runner.sampling.recurrent_flows if protocol == "recurrent" else (1.0,))
-    ]
+    flows = [share * p.omega_0 for share in shares]
     lasts, flow = HOLD * len(flows), Flow.staircase(flows, HOLD)
     pair = StepPair(
         SET, p, "hops", TOP.stacked(), lasts, divisors, round(lasts / SAMPLE), flow=flow
     )
-    (result,) = carry_out(runner, protocol, [pair])
+    (result,) = carry_out(runner, [pair])
     if isinstance(result, Missing):
         yield result
         return
@@ -93,36 +94,24 @@ def hopping(
         coarse, fine = (tops(run, end - MEASURED, end) for run in (result.coarse, result.fine))
         if min(len(coarse.time), len(fine.time)) < 6:
             why = f"at omega_0 = {omega_0:.4g} rad/s the ball does not hop any more"
-            yield Missing(protocol, SET, why)
+            yield runner.missing(SET, why)
             break
-        row = partial(
-            measurement, runner, protocol, SET, q, tasks=result.tasks, **fine.conditions(q)
-        )
+        row = partial(runner.measurement, SET, q, tasks=result.tasks, **fine.conditions(q))
         for quantity, value in fine.values.items():
             yield row(quantity=quantity, value=of_no_step(coarse.values[quantity].value, value))
         if k:
-            parts = (
-                (result.coarse, DISTURBED),
-                (result.fine, DISTURBED),
-                (result.fine, 2 * DISTURBED),
-            )
-            begin, last = k * HOLD, end - MEASURED
-            slow, fast, later = (
-                hop_map(tops(run, begin + after, last).x, q)[0] for run, after in parts
-            )
-            factor = row(
-                quantity="orbit_multiplier",
-                value=of_no_step(slow, estimate(fast, part=abs(fast - later))),
-            )
-            yield if_found(
-                factor, f"no disturbance is seen to shrink at omega_0 = {omega_0:.4g} rad/s"
-            )
+            begin, last = k * HOLD + DISTURBED, end - MEASURED
+            parts = (result.coarse, begin), (result.fine, begin), (result.fine, begin + DISTURBED)
+            slow, fast, later = (hop_map(tops(run, start, last).x, q)[0] for run, start in parts)
+            factor = of_no_step(slow, estimate(fast, part=abs(fast - later)))
+            why = f"no disturbance is seen to shrink at omega_0 = {omega_0:.4g} rad/s"
+            yield if_found(row(quantity="orbit_multiplier", value=factor), why)
         heights.append([hops.values["orbit_height"].value for hops in (coarse, fine)])
     if len(heights) >= 3:
         coarse_birth, fine_birth = (
             birth(flows[: len(heights)], each) for each in zip(*heights, strict=True)
         )
-        yield result.row(runner, "orbit_birth", of_no_step(coarse_birth.value, fine_birth))
+        yield result.row("orbit_birth", of_no_step(coarse_birth.value, fine_birth))
 
 
 def with_groups(p: Parameters, kappa: float, Omega_0: float, **others: float) -> Parameters:
@@ -143,12 +132,10 @@ class Hops(NamedTuple):
 
         Means of two parts could agree by chance, because disturbances swing while they die out."""
         span, periods, height = self.time[-1] - self.time[0], np.diff(self.time), self.x[:, 0]
+        turns = np.diff(self.theta)
         values = {
             "orbit_period": (span / len(periods), periods),
-            "orbit_omega_c": (
-                (self.theta[-1] - self.theta[0]) / span,
-                np.diff(self.theta) / periods,
-            ),
+            "orbit_omega_c": ((self.theta[-1] - self.theta[0]) / span, turns / periods),
             "orbit_height": (height.mean(), height),
         }
         return {
@@ -186,9 +173,8 @@ def hop_map(states: Array, p: Parameters) -> tuple[float, State]:
     matrix = np.linalg.lstsq(weight * changes[:-1], weight * changes[1:])[0]
     shift = z[1:].mean(axis=0) - z[:-1].mean(axis=0) @ matrix
     y, omega_c, slip_x = (units * np.linalg.solve(np.eye(3) - matrix.T, shift)).tolist()
-    return float(np.abs(np.linalg.eigvals(matrix)).max()), State(
-        y=y, omega_c=omega_c, slip_x=slip_x
-    )
+    fixed = State(y=y, omega_c=omega_c, slip_x=slip_x)
+    return float(np.abs(np.linalg.eigvals(matrix)).max()), fixed
 
 
 def birth(flows: Sequence[float], heights: Sequence[float]) -> Estimate:
@@ -217,16 +203,15 @@ def followed(runner: Runner, sets: Sets, records: Records) -> Measured:
     for k, q in enumerate(walls):
         ahead = steady[-1]
         if k > 1:
-            ahead = steady[-2] + (q.eta - etas[k - 2]) / (etas[k - 1] - etas[k - 2]) * (
-                steady[-1] - steady[-2]
-            )
+            way = (q.eta - etas[k - 2]) / (etas[k - 1] - etas[k - 2])
+            ahead = steady[-2] + way * (steady[-1] - steady[-2])
         both = zip(ahead, HOPS_DIVISORS, strict=True)
         tasks.append([task(q, x, FOLLOWED, divisor) for x, divisor in both])
         (runs,) = runner.groups(tasks[-1:])
         parts = [] if isinstance(runs, str) else [tops(run, DISTURBED, FOLLOWED) for run in runs]
         if isinstance(runs, str) or min(len(each.time) for each in parts) < 8:
             why = f"the run {runs}" if isinstance(runs, str) else "the ball does not hop"
-            yield Missing("followed", SET, f"at eta = {q.eta:.4g} {why}")
+            yield runner.missing(SET, f"at eta = {q.eta:.4g} {why}")
             return
         maps = [hop_map(each.x, q) for each in (*parts, tops(runs[1], 2 * DISTURBED, FOLLOWED))]
         factors.append([factor for factor, _ in maps])
@@ -234,11 +219,10 @@ def followed(runner: Runner, sets: Sets, records: Records) -> Measured:
         if q is walls[-4]:  # disturbances begin to grow at one of the last four walls
             near = parts[1].conditions(q)
     place, used = death(etas[-4:], factors[-4:]), [task for pair in tasks[-4:] for task in pair]
-    yield measurement(runner, "followed", SET, walls[-4], "orbit_death", place, used, **near)
-    again = [
-        task(walls[k], np.array(tasks[k][1].x0), LEFT_ALONE, HOPS_DIVISORS[0]) for k in (-4, -1)
-    ]
-    yield from _hops_at_end(runner, "followed", SET, again)
+    yield runner.measurement(SET, walls[-4], "orbit_death", place, used, **near)
+    last = [(walls[k], np.array(tasks[k][1].x0)) for k in (-4, -1)]
+    again = [task(q, x, LEFT_ALONE, HOPS_DIVISORS[0]) for q, x in last]
+    yield from _hops_at_end(runner, SET, again)
 
 
 RESTITUTIONS = tuple(round(0.04 * k, 2) for k in range(18))
@@ -260,9 +244,8 @@ def rebounding(runner: Runner, sets: Sets, records: Records) -> Measured:
     def task(x: Array, lasts: float, restitution: float, divisor: int = 40) -> Task:
         step = coarse_step(p) / divisor
         settings = MOREAU.configure({"timestep": step, "restitution": restitution}, p)
-        return replace(
-            runner.task(p, x, lasts, step, samples=round(lasts / SAMPLE)), settings=settings
-        )
+        usual = runner.task(p, x, lasts, step, samples=round(lasts / SAMPLE))
+        return replace(usual, settings=settings)
 
     for e in RESTITUTIONS:
         (run,) = runner.campaign.run([task(x, MEASURED, e)])
@@ -271,19 +254,19 @@ def rebounding(runner: Runner, sets: Sets, records: Records) -> Measured:
             # the hops swing about their mean, and attract from nearby only
             x = last.x[-8:].mean(axis=0)
         elif not e:
-            yield Missing("rebounding", SET, "the ball does not hop")
+            yield runner.missing(SET, "the ball does not hop")
             return
         if not hops(run) or e in REBOUNDING:
             alone = [task(x, REBOUNDS_ALONE, e, divisor) for divisor in (80, 160)]
             runs = runner.campaign.run(alone)
             at = last.conditions(p) | {"restitution": e, "duration": REBOUNDS_ALONE}
-            yield measurement(runner, "rebounding", SET, p, "hops", hops(runs[0]), alone[:1], **at)
+            yield runner.measurement(SET, p, "hops", hops(runs[0]), alone[:1], **at)
             if not hops(runs[0]):
                 return
             coarse, fine = (tops(run, REBOUNDS_ALONE / 2, REBOUNDS_ALONE).values for run in runs)
             for name in ("orbit_period", "orbit_omega_c"):
                 value = of_no_step(coarse[name].value, fine[name])
-                yield measurement(runner, "rebounding", SET, p, name, value, alone, **at)
+                yield runner.measurement(SET, p, name, value, alone, **at)
 
 
 def death(etas: Sequence[float], factors: Sequence[Sequence[float]]) -> Estimate:
@@ -303,24 +286,22 @@ def swing(runner: Runner, sets: Sets, records: Records) -> Measured:
     With other steps the floor's contact, a hundredth of the weight, opens and closes."""
     p = sets["reference"].replace(mu=2.5, eta=0.38, c=1.0, omega_0=24.648)
     x0 = State(omega_c=22.39, slip_x=-0.03, slip_z=0.26).stacked()
-    (result,) = carry_out(
-        runner, "swing", [StepPair("reference", p, "swing", x0, SWINGING, (60, 80), 12_000)]
-    )
+    pair = StepPair("reference", p, "swing", x0, SWINGING, (60, 80), 12_000)
+    (result,) = carry_out(runner, [pair])
     end = SWINGING - SWUNG
     if isinstance(result, Missing):
         yield result
         return
     if any(np.any(run.case[run.time > end] != Case.SS) for run in (result.coarse, result.fine)):
-        yield Missing("swing", "reference", "the ball does not slip at both points for ever")
+        yield runner.missing("reference", "the ball does not slip at both points for ever")
         return
     begun = (result.coarse, end), (result.fine, end), (result.fine, end - SWUNG)
     parts = [_swing(run, start) for run, start in begun]
     at = state_of(constrained(Case.SS, result.fine.x[-1], p)) | Conditions(period=parts[1][0])
-    for name, coarse, fine, before in zip(
-        ("swing_period", "swing_omega_c", "swing_size"), *parts, strict=True
-    ):
-        size = of_no_step(coarse, estimate(fine, part=abs(fine - before)))
-        yield result.row(runner, name, size, **at)
+    names = "swing_period", "swing_omega_c", "swing_size"
+    for name, coarse, fine, before in zip(names, *parts, strict=True):
+        value = of_no_step(coarse, estimate(fine, part=abs(fine - before)))
+        yield result.row(name, value, **at)
 
 
 def _swing(run: Trajectory, start: float) -> tuple[float, float, float]:
@@ -345,36 +326,26 @@ def calm(runner: Runner, sets: Sets, records: Records) -> Measured:
             slips = p.omega_0 * p.R / p.r * rng.uniform(-2, 2, 3)
             x = State(rng.uniform(0, p.R), 0.0, p.omega_0 * rng.uniform(-0.5, 2), *slips)
             tasks.append(runner.task(p, x, lasts, coarse_step(p) / 4, samples=2000))
-    yield from _hops_at_end(runner, "calm", "strong drag", tasks)
+    yield from _hops_at_end(runner, "strong drag", tasks)
     for task, run in zip(tasks, runner.each(tasks), strict=True):
         if not isinstance(run, str) and not hops(run):
             last = run.omega_c[tail(run)]
             # By chance samples may be the same: no state is known better than a settled one.
             least = QUANTITIES["omega_c"].resolution * task.parameters.omega_0
             end = estimate(last[-1], swing=max(float(np.ptp(last)), least))
-            p, case = task.parameters, settled_case(run).name
-            yield measurement(
-                runner, "calm", "strong drag", p, "end_omega_c", end, [task], case=case
-            )
+            at = Conditions(case=settled_case(run).name)
+            p = task.parameters
+            yield runner.measurement("strong drag", p, "end_omega_c", end, [task], **at)
 
 
-def _hops_at_end(runner: Runner, protocol: str, set: str, tasks: list[Task]) -> Measured:
+def _hops_at_end(runner: Runner, set: str, tasks: list[Task]) -> Measured:
     """Whether each ball hops at the end of a run from a state: 1 or 0."""
     for task, run in zip(tasks, runner.each(tasks), strict=True):
         if isinstance(run, str):
-            yield Missing(protocol, set, f"a run {run}")
+            yield runner.missing(set, f"a run {run}")
         else:
             at = Conditions(duration=task.t_end) | state_of(State.of(task.x0).stacked())
-            yield measurement(
-                runner,
-                protocol,
-                set,
-                task.parameters,
-                "hops",
-                hops(run),
-                [task],
-                **at,
-            )
+            yield runner.measurement(set, task.parameters, "hops", hops(run), [task], **at)
 
 
 def choice(runner: Runner, sets: Sets, records: Records) -> Measured:
@@ -389,12 +360,12 @@ def choice(runner: Runner, sets: Sets, records: Records) -> Measured:
         ),
     }
     starts = [Start(name, q, "rest", np.zeros(8)) for name, q in rough.items()]
-    yield from settled_readings(runner, "choice", starts[: runner.sampling.choice_sets])
+    yield from settled_readings(runner, starts[: runner.sampling.choice_sets])
 
 
 PROTOCOLS = (
-    Protocol("recurrent", hopping),
-    Protocol("stepped", partial(hopping, protocol="stepped", divisors=(40, 80))),
+    Protocol("recurrent", recurrent),
+    Protocol("stepped", stepped),
     Protocol("choice", choice),
     Protocol("followed", followed),
     Protocol("rebounding", rebounding),

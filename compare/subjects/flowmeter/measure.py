@@ -17,7 +17,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -33,7 +32,6 @@ from compare.kit.record import (
     Records,
     Sets,
     if_found,
-    measurement,
 )
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
@@ -57,23 +55,22 @@ def slope(runner: Runner, sets: Sets, records: Records) -> Measured:
     for by, sharp in ("neighbours", 0.3), ("jump", 0.1), ("mean", 1.0):
         own = [curve for curve in curves if curve.by == by]
         starts = [
-            [Start(c.set, c.p.replace(omega_0=w), by, np.array(c.x0)) for w in c.flows] for c in own
+            [Start(c.set, c.p.replace(omega_0=flow), by, c.x0.stacked()) for flow in c.flows]
+            for c in own
         ]
         settled = settling.settle_groups(runner, starts, SettlingCriteria(span=24.0, sharp=sharp))
         for curve, states in zip(own, settled, strict=True):
             where = f"{by} at omega_0 = {curve.p.omega_0:.4g} rad/s"
             if failure := next((each.failure for each in states if each.failure), ""):
-                yield Missing("slope", curve.set, f"{where}: {failure}")
+                yield runner.missing(curve.set, f"{where}: {failure}")
             elif value := _slope(curve, states):
-                tasks, case = [each.task for each in states], states[-1].case.name
-                row = measurement(
-                    runner, "slope", curve.set, curve.p, "slope", value, tasks, case=case, by=by
-                )
+                tasks, at = [s.task for s in states], Conditions(case=states[-1].case.name, by=by)
+                row = runner.measurement(curve.set, curve.p, "slope", value, tasks, **at)
                 yield if_found(row, f"{where}: no slope")
             else:
                 cases = ", ".join(each.case.name for each in states)
                 why = f"{where}: the states there are not of one kind ({cases})"
-                yield Missing("slope", curve.set, why)
+                yield runner.missing(curve.set, why)
 
 
 @dataclass(frozen=True)
@@ -84,7 +81,7 @@ class Curve:
     set: str
     p: Parameters  # with the flow at which the slope is wanted
     flows: tuple[float, ...]
-    x0: tuple[float, ...] = (0.0,) * 8
+    x0: State = State()
     # standard uncertainty of the flow at which slipping sets in, and of others measured so, rad s-1
     noise: float = 0.0
 
@@ -107,17 +104,14 @@ def _curves(name: str, p: Parameters, records: Records, most: int) -> Iterator[C
             omega_0, values = alike[k]
             q = values["omega_c"].parameters
             moving = ("v_y", "omega_c", "slip_x", "slip_y", "slip_z")
-            x0 = (
-                settling.safe_height(q) * (case is Case.NR),
-                *(values[each].value for each in moving),
-                0.0,
-                0.0,
-            )
+            x0 = State(**{each: values[each].value for each in moving})
+            if case is Case.NR:
+                x0 = x0._replace(y=settling.safe_height(q))
             flows = tuple(omega_0 * (1 + d) for d in NEIGHBOURS)
             yield Curve("neighbours", name, q, flows, x0)
     slips, holds = records.threshold(name, "omega_01"), records.threshold(name, "omega_02")
     if slips is not None:
-        q, x0 = p.replace(omega_0=slips.value), (0.0, 0.0, slips.value, 0.0, 0.0, 0.0, 0.0, 0.0)
+        q, x0 = p.replace(omega_0=slips.value), State(omega_c=slips.value)
         around = tuple(slips.value * (1 + d) for d in ACROSS_ONSET)
         yield Curve("jump", name, q, around, x0, slips.uncertainty)
         if holds is not None and holds.value > slips.value:
@@ -147,12 +141,9 @@ def _slope(curve: Curve, states: Sequence[SteadyState]) -> Estimate | None:
         cubic, parabola = np.polyfit(middles, secants, 3), np.polyfit(middles[:3], secants[:3], 2)
         # Noise of the states, propagated to the secants and from them to the slope: no weight in
         # the cubic exceeds 4.
-        solved = 4 * math.sqrt(2) * noise / (f[3] - f[2])
-        placed = parabola[-2] * curve.noise
-        bent = abs(float(cubic[-1] - parabola[-1]))
-        return estimate(
-            cubic[-1] - below, degree=uniform(bent), states=solved, threshold=abs(placed)
-        )
+        solved, placed = 4 * math.sqrt(2) * noise / (f[3] - f[2]), abs(parabola[-2] * curve.noise)
+        bent = uniform(abs(float(cubic[-1] - parabola[-1])))
+        return estimate(cubic[-1] - below, degree=bent, states=solved, threshold=placed)
     if curve.by == "mean" and cases == [Case.RR, Case.RR, Case.SS]:
         first, rise = w[1] + (onset - f[1]) * (w[1] - w[0]) / (f[1] - f[0]), f[2] - onset
         return estimate((w[2] - first) / rise, 3 / rise, states=noise, threshold=curve.noise)
@@ -170,49 +161,40 @@ def hysteresis(runner: Runner, sets: Sets, records: Records) -> Measured:
             ]
         else:
             why = "no flow at which slipping on the floor gives way to riding the wall"
-            yield Missing("hysteresis", name, why)
+            yield runner.missing(name, why)
     tasks = []
     for loop in loops.values():  # a run through all levels, each held for a time
         p, flows = loop[0].p, [level.p.omega_0 for level in loop]
         step, hold = coarse_step(p), settling.duration(p, runner.sampling.hysteresis_hold)
         samples = round(hold / (settling.STEPS_A_SAMPLE * step)) * len(flows)
-        flow = Flow.staircase(flows, hold)
-        tasks.append(
-            runner.task(
-                p, State(omega_c=flows[0]), hold * len(flows), step, flow=flow, samples=samples
-            )
-        )
+        flow, x0, lasts = Flow.staircase(flows, hold), State(omega_c=flows[0]), hold * len(flows)
+        tasks.append(runner.task(p, x0, lasts, step, flow=flow, samples=samples))
     for (name, loop), task, run in zip(loops.items(), tasks, runner.each(tasks), strict=True):
         if isinstance(run, str):
-            yield Missing("hysteresis", name, f"the run {run}")
+            yield runner.missing(name, f"the run {run}")
             continue
         # By how much half the step changes omega_c, relative to omega_0: the largest of all settled
         # states.
-        settled = [
-            m
+        certainty = max(
+            m.uncertainty / m.parameters.omega_0
             for m in records.select("settled", "omega_c")
             if m.set == name and m.parameters.omega_0 > 0
-        ]
-        certainty = max(m.uncertainty / m.parameters.omega_0 for m in settled)
+        )
         count, before = (len(run.time) - 1) // len(loop), "RR"
         for k, level in enumerate(loop):
             held = slice(k * count, (k + 1) * count)
-            part = replace(
-                run, **{column: getattr(run, column)[held] for column in columns(Trajectory)}
-            )
-            ended = settling.judge_run(
-                replace(level, x0=part.x[0]), task, part, runner.sampling.settled_loose
-            )
+            of_level = {column: getattr(run, column)[held] for column in columns(Trajectory)}
+            part, loose = replace(run, **of_level), runner.sampling.settled_loose
+            ended = settling.judge_run(replace(level, x0=part.x[0]), task, part, loose)
             if ended.failure:
                 where = f"level {k + 1} ({level.name}, omega_0 = {level.p.omega_0:.4g} rad/s)"
-                yield Missing("hysteresis", name, f"{where}: {ended.failure}")
+                yield runner.missing(name, f"{where}: {ended.failure}")
             else:
                 at = Conditions(case=ended.case.name, side=level.name, level=k + 1.0, before=before)
-                row = partial(measurement, runner, "hysteresis", name, level.p, tasks=[task], **at)
+                yield runner.measurement(name, level.p, "case", ended.case, [task], **at)
                 omega_c = ended.values["omega_c"]
-                yield row(quantity="case", value=ended.case)
-                value = omega_c.also(time_step=certainty * level.p.omega_0)
-                yield row(quantity="omega_c", value=value)
+                omega_c = omega_c.also(time_step=certainty * level.p.omega_0)
+                yield runner.measurement(name, level.p, "omega_c", omega_c, [task], **at)
             before = settling.physical_case(ended.case).name
 
 
@@ -261,51 +243,43 @@ def unloading(runner: Runner, sets: Sets, records: Records) -> Measured:
     for name, p in sets.items():
         if (limit := records.threshold(name, "omega_02")) is None:
             why = "no flow was measured that is the least to hold a ball on the wall"
-            yield Missing("unloading", name, why)
+            yield runner.missing(name, why)
             continue
         # A pushed ball must neither sink nor roll again: the flow is above the end of rolling by
         # lifting, too.
         lifts = records.threshold(name, "omega_03") or limit
         flows = UNLOADED_FROM * limit.value, 1.1 * max(limit.value, lifts.value)
-        starts.append(
-            [
-                settling.initial_condition(name, p.replace(omega_0=omega), "on the wall")
-                for omega in flows
-            ]
-        )
-    for states in settling.settle_groups(
-        runner, starts, SettlingCriteria(loose=runner.sampling.thresholds_loose)
-    ):
+        starts.append(settling.starts_at(name, p, "on the wall", flows))
+    criteria = SettlingCriteria(loose=runner.sampling.thresholds_loose)
+    for states in settling.settle_groups(runner, starts, criteria):
         for state, names in zip(states, ((LANDING, UNLOADED), (UPWARDS, BY_SPIN)), strict=True):
             if state.failure:
                 why = f"no ball to begin with on the wall: {state.failure}"
-                yield Missing("unloading", state.start.set, why)
+                yield runner.missing(state.start.set, why)
             else:
                 pairs += [_pair(runner, state, name) for name in names]
     kinds: dict[Shown, list[tuple[StepPairResult, Estimate, float]]] = {}
-    for result in carry_out(runner, "unloading", pairs):
+    for result in carry_out(runner, pairs):
         if isinstance(result, Missing):
             yield result
             continue
         name, (before, coarse), (case, fine) = result.pair.name, result.coarse, result.fine
         if name != LANDING and before is case:
-            yield result.row(runner, "case", case)
+            yield result.row("case", case)
         elif name != LANDING:
-            why = f"{name}: with half the time step the ball ends up otherwise"
-            yield Missing("unloading", result.pair.set, why)
+            yield result.missing(f"{name}: with half the time step the ball ends up otherwise")
         if coarse.keys() != fine.keys() or (name == LANDING and not fine):
-            yield Missing("unloading", result.pair.set, f"{name}: the ball does not slip and land")
+            yield result.missing(f"{name}: the ball does not slip and land")
             continue
         for number, value in fine.items():
-            kinds.setdefault(number, []).append(
-                (result, value, abs(coarse[number].value / value.value - 1))
-            )
+            change = abs(coarse[number].value / value.value - 1)
+            kinds.setdefault(number, []).append((result, value, change))
     for number, alike in kinds.items():
         # The difference may be small by chance: at least the median of all pairs counts.
         usual = float(np.median([change for *_, change in alike]))
         for result, fine, change in alike:
             value = fine.also(time_step=uniform(max(change, usual) * abs(fine.value)))
-            row = result.row(runner, number.quantity, value, event=number.event)
+            row = result.row(number.quantity, value, event=number.event)
             yield if_found(row, f"{number.pair}: no {number.quantity}")
 
 
@@ -342,17 +316,8 @@ def _pair(runner: Runner, state: SteadyState, name: str) -> StepPair:
 
     at = Conditions(start=name, duration=t_end) | state_of(x0.stacked())
     samples = None if name == LANDING else 1000
-    return StepPair(
-        state.start.set,
-        p,
-        name,
-        x0.stacked(),
-        t_end,
-        (coarse, fine),
-        samples,
-        read,
-        at=at,
-    )
+    pair = StepPair(state.start.set, p, name, x0.stacked(), t_end, (coarse, fine), samples, read)
+    return replace(pair, at=at)
 
 
 def _landed(run: Trajectory) -> dict[Shown, Estimate]:
@@ -373,10 +338,9 @@ def _landed(run: Trajectory) -> dict[Shown, Estimate]:
     rest = run.v_y[k + 5 : k + 12]  # by then it must have come to rest on the floor
     impulse = estimate(p.m * (float(rest.mean()) - v_y), p.m, rest=float(np.abs(rest).max()))
     sampling = step / math.sqrt(12)
+    slips = estimate(cubic, degree=uniform(abs(cubic - quadratic)), sampling=sampling)
     return {
-        Shown(LANDING, "time", "slip at B"): estimate(
-            cubic, degree=uniform(abs(cubic - quadratic)), sampling=sampling
-        ),
+        Shown(LANDING, "time", "slip at B"): slips,
         Shown(LANDING, "time", "landing"): estimate(run.time[k] + wait, sampling=sampling),
         Shown(LANDING, "landing_speed", "landing"): Estimate(v_y, 0.0),
         Shown(LANDING, "landing_impulse", "landing"): impulse,
@@ -390,10 +354,8 @@ def first_top(run: Trajectory) -> Estimate:
     uncertainty is half of that range."""
     k = int(np.argmax(run.v_y < 0))
     ends = [k - 1, k]
-    before, after = run.v_y[ends]
-    heights = (
-        run.y[ends] + run.v_y[ends] ** 2 * (run.time[k] - run.time[k - 1]) / (before - after) / 2
-    )
+    (before, after), step = run.v_y[ends], run.time[k] - run.time[k - 1]
+    heights = run.y[ends] + run.v_y[ends] ** 2 * step / (before - after) / 2
     return estimate(heights.mean(), sampling=uniform(float(np.ptp(heights)) / 2))
 
 

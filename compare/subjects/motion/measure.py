@@ -34,13 +34,14 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from compare.kit.conditions import Conditions, FluidConditions, state_of
+from compare.kit.conditions import Conditions, state_of
+from compare.kit.conditions import FluidConditions as Fluid
 from compare.kit.programme import Protocol
-from compare.kit.record import Measured, Missing, Records, Sets, measurement
+from compare.kit.record import Measured, Missing, Records, Sets
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.settling import PRESSES, settled_readings
@@ -69,22 +70,10 @@ from model.kinematics import SLIP_XYZ, TURNING, VARIABLES, slip_velocities, stat
 RUN_LENGTH = 768
 """Length of a run in coarse steps, which is about 40 sqrt(R/g), and its samples."""
 ROUNDING = 100 * float(np.finfo(float).eps)
-FLUIDS: Mapping[str, FluidConditions] = {
-    "steel-in-water": {
-        "nu_f": 1.004e-6,
-        "rho_f": 998.2,
-        "rho_b": 7850.0,
-        "r": 5e-3,
-        "gravity": 9.81,
-    },
-    "steel-in-air": {"nu_f": 1.516e-5, "rho_f": 1.204, "rho_b": 7850.0, "r": 5e-3, "gravity": 9.81},
-    "glass-in-glycerine": {
-        "nu_f": 1.18e-3,
-        "rho_f": 1260.0,
-        "rho_b": 2500.0,
-        "r": 8e-3,
-        "gravity": 9.81,
-    },
+FLUIDS: Mapping[str, Fluid] = {
+    "steel-in-water": Fluid(nu_f=1.004e-6, rho_f=998.2, rho_b=7850.0, r=5e-3, gravity=9.81),
+    "steel-in-air": Fluid(nu_f=1.516e-5, rho_f=1.204, rho_b=7850.0, r=5e-3, gravity=9.81),
+    "glass-in-glycerine": Fluid(nu_f=1.18e-3, rho_f=1260.0, rho_b=2500.0, r=8e-3, gravity=9.81),
 }
 """Balls that fall in a fluid, SI."""
 
@@ -98,10 +87,15 @@ class ContactLaw(NamedTuple):
 
 
 def laws(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """How far each law of contact is off at its worst in motions from three starts.
+    """How far each law of contact is off at its worst in motions from three starts, and the speed
+    at which balls sink."""
+    yield from _contact_laws(runner, sets)
+    yield from _sinking(runner)
 
-    And the speed at which balls sink in the middle of still fluid, off floor and wall."""
-    tasks = []
+
+def _contact_laws(runner: Runner, sets: Sets) -> Measured:
+    """How far each law of contact is off at its worst."""
+    tasks, divisors = [], runner.sampling.laws_divisors
     for p in sets.values():
         t_end, fast = RUN_LENGTH * coarse_step(p), 3.0 / time_unit(p)
         up = Flow.sampled([0.0, 0.3 * t_end, 0.7 * t_end], [0.0, fast / 3, fast])
@@ -112,31 +106,31 @@ def laws(runner: Runner, sets: Sets, records: Records) -> Measured:
             (down, State(y=2 * p.R, omega_c=fast)),
             (half, State(omega_c=fast / 3, h=p.R / 2)),
         )
-        finer = [
-            (coarse_step(p) / parts, *start)
-            for parts in runner.sampling.laws_divisors
-            for start in starts
-        ]
         tasks.append(
-            [runner.task(p, x, t_end, h, flow=flow, samples=RUN_LENGTH) for h, flow, x in finer]
+            [
+                runner.task(p, x, t_end, coarse_step(p) / parts, flow=flow, samples=RUN_LENGTH)
+                for parts, (flow, x) in product(divisors, starts)
+            ]
         )
     for (name, p), own, runs in zip(sets.items(), tasks, runner.groups(tasks), strict=True):
         if isinstance(runs, str):
-            yield Missing("laws", name, f"the run {runs}")
+            yield runner.missing(name, f"the run {runs}")
             continue
         coarse, fine = deviations(runs[: len(runs) // 2]), deviations(runs[len(runs) // 2 :])
         for law, value in fine.items():
             if math.isnan(value) or math.isnan(coarse[law]):
-                yield Missing("laws", name, f"no sample at {law.contact} to test: {law.law}", 0)
+                yield runner.missing(name, f"no sample at {law.contact} to test: {law.law}", 0)
                 continue
             # Halving the step may by chance change little: the larger change of the two contacts
             # counts.
             changes = [abs(fine[k] - coarse[k]) for k in fine if k[:2] == law[:2]]
             sure = estimate(value, time_step=float(np.nanmax(changes)), rounding=ROUNDING)
             at = Conditions(law=law.law, contact=law.contact)
-            yield measurement(
-                runner, "laws", name, p, law.quantity, sure, own[len(own) // 2 :], **at
-            )
+            yield runner.measurement(name, p, law.quantity, sure, own[len(own) // 2 :], **at)
+
+
+def _sinking(runner: Runner) -> Measured:
+    """The speed at which balls sink in the middle of still fluid, off floor and wall."""
     balls = {
         name: Parameters.from_fluid(**fluid, R=5 * fluid["r"], mu=0.2, eta=0.2)
         for name, fluid in FLUIDS.items()
@@ -144,25 +138,24 @@ def laws(runner: Runner, sets: Sets, records: Records) -> Measured:
     falls, divisors = [], runner.sampling.laws_divisors
     for p in balls.values():
         step, rest = coarse_step(p), State(y=100 * p.R, h=p.R / 2)
-        begun = rest, rest._replace(v_y=-math.sqrt(p.g * p.R))
+        falling = rest._replace(v_y=-math.sqrt(p.g * p.R))
         falls.append(
             [
                 runner.task(p, x, 64 * step, step / parts, samples=64)
-                for parts in divisors
-                for x in begun
+                for parts, x in product(divisors, (rest, falling))
             ]
         )
     for (name, p), own, runs in zip(balls.items(), falls, runner.groups(falls), strict=True):
         if isinstance(runs, str):
-            yield Missing("laws", name, f"the run {runs}")
+            yield runner.missing(name, f"the run {runs}")
             continue
         (before, _), (speed, lasts) = _sinking_speed(*runs[:2]), _sinking_speed(*runs[2:])
         # What is left of a fall that has only just begun is a difference of speeds, each of them
         # rounded in every step.
         rounding = ROUNDING * abs(speed) / (p.c * lasts)
         sinking = estimate(speed, time_step=abs(speed - before), rounding=rounding)
-        yield measurement(
-            runner, "laws", name, p, "v_y", sinking, own[2:], case="NN", by=name, **FLUIDS[name]
+        yield runner.measurement(
+            name, p, "v_y", sinking, own[2:], case="NN", by=name, **FLUIDS[name]
         )
 
 
@@ -264,13 +257,10 @@ def field(runner: Runner, sets: Sets, records: Records) -> Measured:
         rng = np.random.default_rng([STATES_SEED, *name.encode()])
         for case, k in product(Case, range(runner.sampling.field_starts)):
             x, unit = random_state(case, p, rng), time_unit(p)
-            # Friction at two rolling contacts can balance only a slight lag.
-            rolls = case is Case.RR
-            omega_0 = (
-                State.of(x).omega_c * rng.uniform(0.8, 1.2)
-                if rolls
-                else rng.uniform(0.3, 2.5) / unit
-            )
+            if case is Case.RR:  # friction at two rolling contacts can balance only a slight lag
+                omega_0 = State.of(x).omega_c * rng.uniform(0.8, 1.2)
+            else:
+                omega_0 = rng.uniform(0.3, 2.5) / unit
             q = p.replace(omega_0=omega_0)
             t_end = (WINDOW_CENTRES[-1] + HALF_WINDOW + AROUND_WINDOW) * coarse_step(q) / STEP_RATIO
             pairs.append(StepPair(name, q, f"from {case.name}", x, t_end, divisors, rows=0))
@@ -280,50 +270,42 @@ def field(runner: Runner, sets: Sets, records: Records) -> Measured:
                 speed, Re = math.hypot(v_h, v_y, (p.R - h) * (omega_c - omega_0)), (3e3, 3e4)[k]
                 fast = q.replace(nu_f=2 * p.r * speed / Re, c=24 / (p.C_D * Re * unit))
                 pairs.append(replace(pairs[-1], p=fast))
-    results = []
-    for result in carry_out(runner, "field", pairs):
-        if isinstance(result, Missing):
-            yield result
-        else:
-            results.append(result)
+    found = list(carry_out(runner, pairs))
+    yield from (each for each in found if isinstance(each, Missing))
+    results = [each for each in found if not isinstance(each, Missing)]
     kept = Counter[tuple[str, float, Case]]()
     for centre, result in product(WINDOW_CENTRES, results):
-        set = result.pair.set
-        p = result.pair.p
         case = Case(int(result.coarse.case[centre * runner.sampling.field_steps[1]]))
-        enough = kept[set, p.nu_f, case] >= runner.sampling.field_kept
-        if not enough and (found := _values(runner, case, result, centre)):
-            kept[set, p.nu_f, case] += 1
-            x, values = found
+        alike = result.pair.set, result.pair.p.nu_f, case
+        enough = kept[alike] >= runner.sampling.field_kept
+        if not enough and (amid := _values(case, result, centre)):
+            kept[alike] += 1
+            x, values = amid
             for what, value in values.items():
-                at = Conditions(case=case.name) | state_of(x)
-                yield result.row(runner, what, value, **at)
+                yield result.row(what, value, **(Conditions(case=case.name) | state_of(x)))
     for name, case in product(sets, Case):
         if lacking := runner.sampling.field_kept - kept[name, sets[name].nu_f, case]:
-            why = (
-                f"too few random starts moved smoothly in case {case.name} for {2 * HALF_WINDOW} "
-                "steps"
-            )
+            why = f"too few random starts moved smoothly in case {case.name} for "
+            why += f"{2 * HALF_WINDOW} steps"
             rows = len(MOVING[case]) + len(_forces(case, np.zeros(6)))
-            yield Missing("field", name, why, lacking * rows)
+            yield runner.missing(name, why, lacking * rows)
 
 
 def _values(
-    runner: Runner, case: Case, result: StepPairResult, centre: int
+    case: Case, result: StepPairResult, centre: int
 ) -> tuple[Array, dict[str, Estimate]] | None:
     """State (8,), rates and forces amid a window; None if it changes case, or `turns_or_hovers`.
 
     They are extrapolated to a vanishing step, see `of_three_steps`, and uncertain by what that may
     leave, and by what the degree of the polynomials changes of the limit, see `unlike`."""
-    p, read = result.pair.p, []
+    p, runner, read = result.pair.p, result.runner, []
     for run, times in zip(result.reads, runner.sampling.field_steps, strict=True):
-        near = (HALF_WINDOW + AROUND_WINDOW) * times
-        half = HALF_WINDOW * times
-        middle = centre * times
+        middle, half, around = (
+            steps * times for steps in (centre, HALF_WINDOW, HALF_WINDOW + AROUND_WINDOW)
+        )
         window = slice(middle - half, middle + half + 1)
-        if np.any(run.case[middle - near : middle + near + 1] != case) or turns_or_hovers(
-            case, run, window
-        ):
+        changes = np.any(run.case[middle - around : middle + around + 1] != case)
+        if changes or turns_or_hovers(case, run, window):
             return None
         time, at = run.time[window], float(run.time[middle])
         # The forces of a sample act from then on for a step: they belong to the middle of it.
@@ -367,17 +349,12 @@ def turns_or_hovers(case: Case, run: Trajectory, window: slice) -> bool:
     """Whether a slipping contact carries almost nothing, or its slip changes too much."""
     p, time = run.header.parameters, float(np.ptp(run.time[window]))
     loads = (p.mu, run.force_A[window, 1]), (p.eta, run.force_B[window, 0])
-    for v, contact, (friction, load) in zip(
-        slip_velocities(run.x[window], p), (case.A, case.B), loads, strict=True
-    ):
-        change = max(
-            float(np.linalg.norm(v[-1] - v[0])),
-            friction * load.max() * (1 + p.j) / (p.j * p.m) * time,
-        )
-        hovers = load.min() < PRESSES * p.m * p.g
-        if contact is Contact.S and (
-            hovers or change > MOST_TURN * np.linalg.norm(v, axis=1).min()
-        ):
+    slips = slip_velocities(run.x[window], p)
+    for v, contact, (friction, load) in zip(slips, (case.A, case.B), loads, strict=True):
+        by_friction = friction * load.max() * (1 + p.j) / (p.j * p.m) * time
+        change = max(float(np.linalg.norm(v[-1] - v[0])), by_friction)
+        turns = change > MOST_TURN * np.linalg.norm(v, axis=1).min()
+        if contact is Contact.S and (turns or load.min() < PRESSES * p.m * p.g):
             return True
     return False
 
@@ -410,6 +387,8 @@ STARTS: tuple[tuple[float, tuple[float, ...]], ...] = (
 
 PIECE = 40
 """Of a motion, in samples."""
+TURNS = len(VARIABLES[TURNING])
+"""Measurements at the end of a piece, beside the case."""
 APART = 10
 """Samples between the ends of a piece and any change of case: three until a force has built up,
 three until the case is taken to have changed, and a few by which a change comes too early or
@@ -429,45 +408,41 @@ def motions(runner: Runner, sets: Sets, records: Records) -> Measured:
     for start, task, run in zip(starts, tasks, runner.each(tasks), strict=True):
         name, p = start.set, start.p
         if isinstance(run, str):
-            yield Missing("motions", name, f"a motion {run}", count * (1 + len(VARIABLES[TURNING])))
+            yield runner.missing(name, f"a motion {run}", count * (1 + TURNS))
             continue
         chosen = pieces(run, count)
         if lacking := count - len(chosen):
-            why = (
-                "near the ends of pieces the case changes, or a contact hovers, creeps or slips "
-                "by a trace"
-            )
-            yield Missing("motions", name, why, lacking * (1 + len(VARIABLES[TURNING])))
+            why = "near the ends of pieces the case changes, or a contact hovers, creeps or slips "
+            yield runner.missing(name, f"{why}by a trace", lacking * (1 + TURNS))
         for first, last in ((first, first + PIECE) for first in chosen):
             case = Case(int(run.case[last]))
             seen[name].add(case)
             x = constrained(Case(int(run.case[first])), run.x[first], p)
             time = float(run.time[last] - run.time[first])
             at = Conditions(case=case.name, time=time) | state_of(x)
-            yield measurement(runner, "motions", name, p, "case", case, [task], **at)
-            rows = len(VARIABLES[TURNING])
+            yield runner.measurement(name, p, "case", case, [task], **at)
             divisors = STEP_RATIO // 2, STEP_RATIO, 2 * STEP_RATIO
-            piece = StepPair(name, p, case.name, x, time, divisors, at=at, rows=rows)
+            piece = StepPair(name, p, case.name, x, time, divisors, at=at, rows=TURNS)
             again.append(piece)
-    for result in carry_out(runner, "motions", again):
-        yield from [result] if isinstance(result, Missing) else _turns_at_end(runner, result)
+    for result in carry_out(runner, again):
+        yield from [result] if isinstance(result, Missing) else _turns_at_end(result)
     for name, cases in seen.items():
         if unseen := [case.name for case in Case if case not in cases]:
-            yield Missing("motions", name, f"no piece of a motion ended in {', '.join(unseen)}", 0)
+            yield runner.missing(name, f"no piece of a motion ended in {', '.join(unseen)}", 0)
 
 
-def _turns_at_end(runner: Runner, piece: StepPairResult) -> Measured:
+def _turns_at_end(piece: StepPairResult) -> Measured:
     """How the ball turns at the end of a piece that is run anew with all steps."""
     pair = piece.pair
     if {pair.name} != {Case(int(run.case[-1])).name for run in piece.reads}:
         why = f"a piece that ended in {pair.name} does not with other steps or forces at first"
-        yield Missing("motions", pair.set, why, len(VARIABLES[TURNING]))
+        yield piece.missing(why)
         return
-    late = closing_error(runner, pair.p) if closes(piece.fine) else 0.0
+    late = closing_error(piece.runner, pair.p) if closes(piece.fine) else 0.0
     for name, value, unit, off in list(zip(VARIABLES, *_ends(piece), strict=True))[TURNING]:
         # where a case changes, steps may by chance agree: forces lag behind
         read = estimate(value, unit, time_step=max(off, lag_error(pair.p)), closing=late)
-        yield piece.row(runner, f"end_{name}", read)
+        yield piece.row(f"end_{name}", read)
 
 
 def _ends(piece: StepPairResult) -> tuple[list[float], ...]:
@@ -520,9 +495,8 @@ def pieces(run: Trajectory, count: int) -> list[int]:
     chosen: set[int] = set()
     for some in (firsts[inside], firsts[~inside]):
         if len(some):
-            chosen |= set(
-                some[np.linspace(0, len(some) - 1, count // 2).round().astype(int)].tolist()
-            )
+            places = np.linspace(0, len(some) - 1, count // 2).round().astype(int)
+            chosen |= set(some[places].tolist())
     return sorted(chosen)
 
 
@@ -560,19 +534,12 @@ def impacts(runner: Runner, sets: Sets, records: Records) -> Measured:
             start = _start(name, p, 0.8, state, how)
             step = coarse_step(start.p) / STEP_RATIO
             known = Conditions(start=how) | state_of(start.x0)
-            t_end, divisors = round(0.4 * time_unit(p) / step) * step, (STEP_RATIO, 2 * STEP_RATIO)
-            pairs.append(
-                StepPair(
-                    **vars(start),
-                    t_end=t_end,
-                    divisors=divisors,
-                    at=known,
-                    rows=len(LANDED),
-                )
-            )
+            times: dict[str, Any] = {"divisors": (STEP_RATIO, 2 * STEP_RATIO)}
+            times["t_end"] = round(0.4 * time_unit(p) / step) * step
+            pairs.append(StepPair(**vars(start), **times, at=known, rows=len(LANDED)))
     rebounds, tasks = dict.fromkeys(sets, 0), {name: list[Task]() for name in sets}
     landed = list[tuple[StepPairResult, int, float]]()
-    for landing in carry_out(runner, "impacts", pairs):
+    for landing in carry_out(runner, pairs):
         if isinstance(landing, Missing):
             yield landing
             continue
@@ -594,13 +561,12 @@ def impacts(runner: Runner, sets: Sets, records: Records) -> Measured:
         units, late = state_units(p), closing_error(runner, p)
         for name in LANDED:
             k = VARIABLES.index(name)
-            value = estimate(
-                landing.fine.x[2 * at, k], float(units[k]), time_step=off, closing=late
-            )
-            yield landing.row(runner, f"after_{name}", value, time=float(landing.coarse.time[at]))
+            x, unit = landing.fine.x[2 * at, k], float(units[k])
+            value = estimate(x, unit, time_step=off, closing=late)
+            yield landing.row(f"after_{name}", value, time=float(landing.coarse.time[at]))
     for name, count in rebounds.items():
         p = next(pair.p for pair in pairs if pair.set == name)
-        yield measurement(runner, "impacts", name, p, "rebounds", count, tasks[name])
+        yield runner.measurement(name, p, "rebounds", count, tasks[name])
 
 
 def _after_landing(landing: StepPairResult) -> tuple[int, float] | Missing:
@@ -610,8 +576,9 @@ def _after_landing(landing: StepPairResult) -> tuple[int, float] | Missing:
     contact = [case.A if pair.name.startswith("floor") else case.B for case in coarse.cases]
     at = next((k for k, each in enumerate(contact) if each is not Contact.N), len(contact)) + 6
     if at >= len(contact) or coarse.case[at] != fine.case[2 * at]:
-        why = f"{pair.name}: the contact did not close for good within 0.4 sqrt(R/g)"
-        return Missing("impacts", pair.set, why, len(LANDED))
+        return landing.missing(
+            f"{pair.name}: the contact did not close for good within 0.4 sqrt(R/g)"
+        )
     changes = np.abs(fine.x[2 * at] - coarse.x[at]) / state_units(pair.p)
     return at, float(changes[[VARIABLES.index(name) for name in LANDED]].max())
 
@@ -642,33 +609,29 @@ def torque(runner: Runner, sets: Sets, records: Records) -> Measured:
     for name, p in sets.items():
         q = p.replace(mu=1.0, eta=1.0, fluid_torque=0.5 * p.c, omega_0=0.6 / time_unit(p))
         starts.append(Start(name, q, "rest", np.zeros(8)))
-    yield from settled_readings(runner, "torque", starts)
+    yield from settled_readings(runner, starts)
 
 
 def whole_runs(runner: Runner, sets: Sets, records: Records) -> Measured:
     """Where each start ends: its state; on smooth walls, rough floors case and orbit."""
-    for run in carry_out(
-        runner, "runs", [pair for name, p in sets.items() for pair in _pairs(name, p)]
-    ):
+    for run in carry_out(runner, [pair for name, p in sets.items() for pair in _pairs(name, p)]):
         if isinstance(run, Missing):
             yield run
             continue
         p, how, coarse, fine = run.pair.p, run.pair.name, run.coarse, run.fine
         time = float(fine.time[-1])
         if coarse.case[-1] != fine.case[-1]:
-            why = f"{how}: with half the time step the ball ends in another case"
-            yield Missing("runs", run.pair.set, why, run.pair.rows)
+            yield run.missing(f"{how}: with half the time step the ball ends in another case")
         elif how == "rough floor" and fine.force_A[:, 1].mean() < PRESSES * p.m * p.g:
-            why = f"{how}: the contact force is so small that the ball may hover"
-            yield Missing("runs", run.pair.set, why, run.pair.rows)
+            yield run.missing(f"{how}: the contact force is so small that the ball may hover")
         else:
             if apart := how in ("smooth wall", "rough floor"):
-                yield run.row(runner, "case", float(fine.case[-1]), time=time)
+                yield run.row("case", float(fine.case[-1]), time=time)
             for variable, value, size, off in zip(VARIABLES, *_ends(run), strict=True):
                 if variable == "omega_c" or not apart:
                     least = lag_error(p) if apart else 0.0  # next to a change of case
                     row = estimate(value, size, time_step=max(off, least))
-                    yield run.row(runner, f"end_{variable}", row, time=time)
+                    yield run.row(f"end_{variable}", row, time=time)
 
 
 def _pairs(name: str, p: Parameters) -> Iterator[StepPair]:
@@ -678,14 +641,12 @@ def _pairs(name: str, p: Parameters) -> Iterator[StepPair]:
     def pair(
         how: str, p: Parameters, x: State, lasts: float, rows: int = 1, rate: float | None = None
     ) -> StepPair:
-        count = round(lasts * unit / coarse_step(p))
-        t_end, at = count * coarse_step(p), Conditions(start=how) | state_of(x.stacked())
-        flow = None
+        count, x0, flow = round(lasts * unit / coarse_step(p)), x.stacked(), None
+        t_end, at = count * coarse_step(p), Conditions(start=how) | state_of(x0)
         if rate is not None:
-            flow, at = late_ramp(p, rate, t_end), at | {"rate": rate}
-        return StepPair(
-            name, p, how, x.stacked(), t_end, (4, 8, 16), count, flow=flow, at=at, rows=rows
-        )
+            flow, at = late_ramp(p, rate, t_end), at | Conditions(rate=rate)
+        begun = StepPair(name, p, how, x0, t_end, (4, 8, 16), count, rows=rows)
+        return replace(begun, flow=flow, at=at)
 
     for how, (flow, lasts, x) in RUN_STARTS.items():
         start, q = State(*(np.array(x) * state_units(p))), p.replace(omega_0=flow / unit)

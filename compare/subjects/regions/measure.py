@@ -28,7 +28,7 @@ from compare.kit.brackets import Attempt, Bracket, Search, narrow
 from compare.kit.conditions import Conditions
 from compare.kit.levels import Level
 from compare.kit.programme import Protocol
-from compare.kit.record import Measured, Missing, Records, Sets, if_found, measurement
+from compare.kit.record import Measured, Records, Sets, if_found
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.settling import (
@@ -37,6 +37,7 @@ from compare.kit.settling import (
     physical_case,
     rounded_duration,
     settle_groups,
+    starts_at,
 )
 from compare.kit.statistics import (
     COVERAGE,
@@ -48,6 +49,7 @@ from compare.kit.statistics import (
     tail,
     taper,
 )
+from compare.kit.step_pairs import constrained
 from compare.kit.tasks import Task
 from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
@@ -100,9 +102,7 @@ def planes(runner: Runner, sets: Sets, records: Records) -> Measured:
                 mask = sum(1 << case for case in {physical_case(each.case) for each in states})
                 plane.seen.append((u, mask))
                 q, tasks = states[0].start.p, [each.task for each in states]
-                yield measurement(
-                    runner, "plane", "reference", q, "cases", mask, tasks, figure=plane.figure
-                )
+                yield runner.measurement("reference", q, "cases", mask, tasks, figure=plane.figure)
         for plane in both:
             plane.tried |= {tuple(u.tolist()) for u in plane.points}
             fresh = (u for u in added_points(plane.seen) if tuple(u.tolist()) not in plane.tried)
@@ -111,7 +111,7 @@ def planes(runner: Runner, sets: Sets, records: Records) -> Measured:
         if out := len(plane.tried) - len(plane.seen):
             at = f"{plane.figure}: {out} of {len(plane.tried)} points"
             why = f"{at} are left out, too close to a change of case to settle"
-            yield Missing("plane", "reference", why)
+            yield runner.missing("reference", why)
 
 
 def added_points(seen: Sequence[tuple[Array, int]]) -> list[Array]:
@@ -158,12 +158,12 @@ def borders(runner: Runner, sets: Sets, records: Records) -> Measured:
     for name, p in sets.items():
         holds, folds = (records.threshold(name, omega) for omega in ("omega_02", "omega_04"))
         if p.drag == QUADRATIC:
-            yield Missing("edge", name, SWINGS_ON)
+            yield runner.missing(name, SWINGS_ON)
         elif holds and folds:
             limits[name] = holds.value, folds.value
         else:
             why = "at no flow are a slipping ball and a lifted one both settled"
-            yield Missing("edge", name, why)
+            yield runner.missing(name, why)
     at_quick = runner.level is Level.QUICK
     soonest = max(limits, key=lambda name: sets[name].c, default="") if at_quick else ""
     flows = [
@@ -171,56 +171,49 @@ def borders(runner: Runner, sets: Sets, records: Records) -> Measured:
         for name, (low, high) in limits.items()
         for part in (CLOSING if name == soonest else runner.sampling.edge_flows)
     ]
-    starts = [
-        [initial_condition(name, p, "rest"), initial_condition(name, p, "on the wall")]
-        for name, p in flows
-    ]
+    ways = ("rest", "on the wall")
+    starts = [[initial_condition(name, p, how) for how in ways] for name, p in flows]
+    settled = settle_groups(runner, starts, SettlingCriteria(loose=10.0))
     edges = []  # first on the line between the two attractors
-    for (name, p), (slipping, lifted) in zip(
-        flows, settle_groups(runner, starts, SettlingCriteria(loose=10.0)), strict=True
-    ):
-        if (
-            slipping.failure
-            or lifted.failure
-            or (slipping.case, physical_case(lifted.case)) != (Case.SS, Case.NR)
-        ):
+    for (name, p), (slipping, lifted) in zip(flows, settled, strict=True):
+        if not (slipping.settled_in(Case.SS) and lifted.settled_in(Case.NR, Case.SR)):
             came_to = ", ".join(state.failure or state.case.name for state in (slipping, lifted))
             why = f"no two attractors settled at omega_0 = {p.omega_0:.4g} rad/s: {came_to}"
-            yield Missing("edge", name, why)
+            yield runner.missing(name, why)
         else:
-            a, b = _on_floor_and_wall(slipping.mean), _on_floor_and_wall(lifted.mean)
-            edges.append(Edge(name, p, a, b, a, b - a))
+            # on floor and wall: a lifted ball moves alike at every height
+            a, b = (constrained(Case.SS, state.mean, p) for state in (slipping, lifted))
+            edges.append(Edge(runner, name, p, a, b, a, b - a))
     for _ in range(runner.sampling.edge_lines):
-        lines = [_next_line(edge) for edge in edges]
-        brackets = narrow(runner, [_search(runner, line) for line in lines], careful=False)
-        edges = [
-            e.crossed(line, bracket)
-            for e, line, bracket in zip(edges, lines, brackets, strict=True)
-        ]
+        lines = [edge.with_next_line() for edge in edges]
+        brackets = narrow(runner, [line.search() for line in lines], careful=False)
+        rows = zip(edges, lines, brackets, strict=True)
+        edges = [edge.crossed(line, bracket) for edge, line, bracket in rows]
     for edge in edges:
-        yield from _edge_rows(runner, edge)
+        yield from edge.rows()
     for name, (low, high) in limits.items():
         last = low + (max(CLOSING) + 1e-6) * (high - low)
         near = [edge for edge in edges if edge.moves and edge.set == name and edge.p.omega_0 < last]
         if len(near) >= len(CLOSING):
             # The edge meets the lifted ball where both have the same omega_c.
-            noise = max(float(_uncertainty(edge)[2]) for edge in near)
+            noise = max(float(edge.uncertainty[2]) for edge in near)
             apart = [estimate((edge.crossing - edge.lifted)[2], edge=noise) for edge in near]
             place = extrapolated_zero(np.array([edge.p.omega_0 for edge in near]), apart)
             tasks = [task for edge in near if edge.bracket for task in edge.bracket.tasks]
             p = sets[name].replace(omega_0=place.value)
             at = Conditions(side="from above", by="unstable slipping meets the lifted ball")
-            row = measurement(runner, "edge", name, p, "omega_02", place, tasks, **at)
+            row = runner.measurement(name, p, "omega_02", place, tasks, **at)
             yield if_found(row, "the edge points to no flow at which it meets the lifted ball")
         elif name == soonest or not at_quick:
             why = "too few crossings to follow the edge to where it meets the lifted ball"
-            yield Missing("edge", name, why)
+            yield runner.missing(name, why)
 
 
 @dataclass(frozen=True, eq=False)
 class Edge:
     """The border between two basins at one flow, and where it crosses a line."""
 
+    runner: Runner
     set: str
     p: Parameters
     slipping: Array
@@ -243,33 +236,78 @@ class Edge:
         if None in bracket.runs:
             return replace(self, moves=(), missed=self.missed + 1)
         crossed = replace(line, bracket=bracket, missed=0)
-        return replace(
-            crossed,
-            moves=(*self.moves, np.abs(crossed.crossing - self.crossing)) if self.bracket else (),
-        )
+        if not self.bracket:
+            return replace(crossed, moves=())
+        return replace(crossed, moves=(*self.moves, np.abs(crossed.crossing - self.crossing)))
 
+    def with_next_line(self) -> Edge:
+        """The edge with the next line: from where the last two runs agreed, as they part.
 
-def _on_floor_and_wall(x: Array) -> Array:
-    """The state put on floor and wall: a lifted ball moves alike at every height."""
-    return State.of(x)._replace(y=0.0, v_y=0.0, h=0.0, v_h=0.0).stacked()
+        Together they are within 2e-3 of the distance of the attractors."""
+        if self.bracket is None:
+            return self
+        both, before = [run.x for run in self.bracket.runs if run is not None], self.line
+        low, high = (x[: min(map(len, both))] for x in both)
+        along = np.abs((high - low) @ before / float(before @ before))
+        together = int(np.argmax(along > 2e-3)) or len(along)
+        length = max(together - together // 4, 1)
+        weights = taper(length)
+        mean = weights @ (low + high)[together - length : together] / (2 * weights.sum())
+        parting = constrained(Case.SS, (high - low)[together - 1], self.p)
+        line = parting * float(before @ before) / float(parting @ before)
+        return replace(self, centre=constrained(Case.SS, mean, self.p), line=line)
 
+    def search(self) -> Search:
+        """A search for the place of the border on the line.
 
-def _search(runner: Runner, edge: Edge) -> Search:
-    """A search for the place of the border on an edge's line.
+        Later lines are a hundredth as long, and four times as long after each that missed the
+        border."""
+        p, runner = self.p, self.runner
+        t_end, step = rounded_duration(p, runner.sampling.edge_time), coarse_step(p)
+        around, width = Bracket(0.0, 1.0), 1e-5
+        if self.bracket:
+            reach = 5e-3 * 4.0**self.missed
+            around, width = Bracket(-reach, reach), 2.5e-6
 
-    Later lines are a hundredth as long, and four times as long after each that missed the border.
-    """
-    t_end, step = rounded_duration(edge.p, runner.sampling.edge_time), coarse_step(edge.p)
-    reach = 5e-3 * 4.0**edge.missed
-    around, width = (Bracket(-reach, reach), 2.5e-6) if edge.bracket else (Bracket(0.0, 1.0), 1e-5)
+        def task(s: float, bracket: Bracket, attempt: Attempt) -> Task:
+            lasts, x0 = t_end * attempt.time, self.centre + s * self.line
+            return runner.task(p, x0, lasts, step, samples=round(lasts / (8 * step)))
 
-    def task(s: float, bracket: Bracket, attempt: Attempt) -> Task:
-        lasts = t_end * attempt.time
-        return runner.task(
-            edge.p, edge.centre + s * edge.line, lasts, step, samples=round(lasts / (8 * step))
-        )
+        return Search(around, task, partial(ends_slipping, edge=self), width)
 
-    return Search(around, task, partial(ends_slipping, edge=edge), width)
+    @property
+    def uncertainty(self) -> Array:
+        """Standard uncertainty of the crossing (8,), by the last bracket and further lines.
+
+        They are taken to shrink as the last two did: together they are at least the last one, and
+        at most ten of its size; and no less than the distance from the crossing to the next line,
+        through the mean of the last two runs."""
+        assert self.bracket is not None
+        *_, before, last = (0.0, *(float(np.linalg.norm(move[SLIP_XYZ])) for move in self.moves))
+        ratio = min(last / before, 0.9) if before else 0.0
+        onward, roll = self.with_next_line(), self.p.R / self.p.r
+        alike = np.array([1.0, 1.0, roll, 1.0, 1.0, 1.0, 1.0, 1.0])
+        off, along = (onward.centre - self.crossing) * alike, onward.line * alike
+        ahead = np.abs(off - (off @ along) / (along @ along) * along) / alike
+        moves = np.maximum(self.moves[-1] / (1 - ratio), ahead)
+        return np.asarray(np.hypot(self.bracket.place.uncertainty * self.line, moves))
+
+    def rows(self) -> Measured:
+        """Measurements of the state: omega_c, slips and the spin on the wall."""
+        p, runner = self.p, self.runner
+        # it is to be crossed by the last line, and by one before
+        if not (self.moves and self.bracket):
+            at = f"at omega_0 = {p.omega_0:.4g} rad/s"
+            why = f"{at} the last lines missed the border between the two attractors"
+            yield runner.missing(self.set, why, 5)
+            return
+        x, sure, roll = State.of(self.crossing), State.of(self.uncertainty), p.R / p.r
+        values = {name: getattr(x, name) for name in ("omega_c", "slip_x", "slip_y", "slip_z")}
+        values["wall_spin"] = x.slip_x + roll * x.omega_c
+        slips = max(sure.slip_x, sure.slip_y, sure.slip_z, roll * sure.omega_c)
+        for name, value in values.items():
+            of = estimate(value, edge=slips / roll if name == "omega_c" else slips)
+            yield runner.measurement(self.set, p, f"edge_{name}", of, self.bracket.tasks, case="SS")
 
 
 def ends_slipping(run: Trajectory, edge: Edge) -> bool | None:
@@ -291,60 +329,6 @@ def ends_slipping(run: Trajectory, edge: Edge) -> bool | None:
     end = last + now * abs(now) / max(abs(before) - abs(now), abs(now), 1e-300)
     rests = [abs(end - each) < ARRIVED * way for each in (slipping, lifted)]
     return rests[0] if any(rests) else None
-
-
-def _next_line(edge: Edge) -> Edge:
-    """The edge with the next line: from where the last two runs agreed, as they part.
-
-    Together they are within 2e-3 of the distance of the attractors."""
-    if edge.bracket is None:
-        return edge
-    both = [run.x for run in edge.bracket.runs if run is not None]
-    low, high = (x[: min(map(len, both))] for x in both)
-    along = np.abs((high - low) @ edge.line / float(edge.line @ edge.line))
-    together = int(np.argmax(along > 2e-3)) or len(along)
-    length = max(together - together // 4, 1)
-    weights = taper(length)
-    mean = weights @ (low + high)[together - length : together] / (2 * weights.sum())
-    parting = _on_floor_and_wall((high - low)[together - 1])
-    line = parting * float(edge.line @ edge.line) / float(parting @ edge.line)
-    return replace(edge, centre=_on_floor_and_wall(mean), line=line)
-
-
-def _uncertainty(edge: Edge) -> Array:
-    """Standard uncertainty of the crossing (8,), by the last bracket and further lines.
-
-    They are taken to shrink as the last two did: together they are at least the last one, and at
-    most ten of its size; and no less than the distance from the crossing to the next line, through
-    the mean of the last two runs."""
-    assert edge.bracket is not None
-    *_, before, last = (0.0, *(float(np.linalg.norm(move[SLIP_XYZ])) for move in edge.moves))
-    ratio = min(last / before, 0.9) if before else 0.0
-    onward, roll = _next_line(edge), edge.p.R / edge.p.r
-    alike = np.array([1.0, 1.0, roll, 1.0, 1.0, 1.0, 1.0, 1.0])
-    off, along = (onward.centre - edge.crossing) * alike, onward.line * alike
-    ahead = np.abs(off - (off @ along) / (along @ along) * along) / alike
-    moves = np.maximum(edge.moves[-1] / (1 - ratio), ahead)
-    return np.asarray(np.hypot(edge.bracket.place.uncertainty * edge.line, moves))
-
-
-def _edge_rows(runner: Runner, edge: Edge) -> Measured:
-    """Measurements of the state on an edge: omega_c, slips and the spin on the wall."""
-    if not (edge.moves and edge.bracket):  # it is to be crossed by the last line, and by one before
-        at = f"at omega_0 = {edge.p.omega_0:.4g} rad/s"
-        why = f"{at} the last lines missed the border between the two attractors"
-        yield Missing("edge", edge.set, why, 5)
-        return
-    x, sure = State.of(edge.crossing), State.of(_uncertainty(edge))
-    roll = edge.p.R / edge.p.r
-    values = {name: getattr(x, name) for name in ("omega_c", "slip_x", "slip_y", "slip_z")}
-    values["wall_spin"] = x.slip_x + roll * x.omega_c
-    slips = max(sure.slip_x, sure.slip_y, sure.slip_z, roll * sure.omega_c)
-    for name, value in values.items():
-        of = estimate(value, edge=slips / roll if name == "omega_c" else slips)
-        yield measurement(
-            runner, "edge", edge.set, edge.p, f"edge_{name}", of, edge.bracket.tasks, case="SS"
-        )
 
 
 FIRST_DRAGS = (2.0, 4.0)
@@ -377,47 +361,38 @@ def birth(runner: Runner, sets: Sets, records: Records) -> Measured:
     lags: dict[str, Estimate] = {}
     drags = [(name, kappa / time_unit(sets[name])) for name in ranges for kappa in FIRST_DRAGS]
     for _ in (FIRST_DRAGS, NEARER_DRAGS):
-        starts = [
-            [
-                initial_condition(
-                    name, sets[name].replace(c=c, omega_0=high - part * (high - low)), "rest"
-                )
-                for part in BEFORE_FOLD
-            ]
-            for name, c in drags
-            for low, high in [ranges[name]]
-        ]
+        starts = []
+        for name, c in drags:
+            low, high = ranges[name]
+            flows = (high - part * (high - low) for part in BEFORE_FOLD)
+            starts.append(starts_at(name, sets[name].replace(c=c), "rest", flows))
         for (name, c), states in zip(drags, settle_groups(runner, starts), strict=True):
-            if not any(state.failure or state.case is not Case.SS for state in states):
-                flows = np.array([state.start.p.omega_0 for state in states])
-                slope = initial_slope(flows, [state.values["force_Ay"] for state in states])
+            if all(state.settled_in(Case.SS) for state in states):
+                places = np.array([state.start.p.omega_0 for state in states])
+                slope = initial_slope(places, [state.values["force_Ay"] for state in states])
                 found[name].append(BranchEnd(1 / c, slope, [state.task for state in states]))
         for name, own in found.items():
             if len(own) >= len(FIRST_DRAGS):
-                values, noise = zip(
+                slopes, noise = zip(
                     *((end.slope.value, end.slope.uncertainty) for end in own), strict=True
                 )
-                lags[name], _ = straight_line([end.lag for end in own], values, noise)
-        drags = [
-            (name, 1 / lag.value * k)
-            for name, lag in lags.items()
-            if lag.value > 0
-            for k in NEARER_DRAGS
-        ]
+                lags[name], _ = straight_line([end.lag for end in own], slopes, noise)
+        births = [(name, lag.value) for name, lag in lags.items() if lag.value > 0]
+        drags = [(name, 1 / lag * k) for name, lag in births for k in NEARER_DRAGS]
     for name, p in sets.items():
         if name not in ranges:
             why = "there is no range of slipping at both points that ends at the wall"
-            yield Missing("birth", name, why)
+            yield runner.missing(name, why)
         elif len(found[name]) < len(FIRST_DRAGS) + len(NEARER_DRAGS):
             why = "too few states of slipping at both points settle near the end of the branch"
-            yield Missing("birth", name, why)
+            yield runner.missing(name, why)
         else:
             lag = lags[name]
             drag = replace(lag.times(1 / lag.value**2), value=1 / lag.value)
             tasks = [task for end in found[name] for task in end.tasks]
-            row = measurement(runner, "birth", name, p, "critical_drag", drag, tasks)
+            row = runner.measurement(name, p, "critical_drag", drag, tasks)
             sure = lag.value > COVERAGE * lag.uncertainty  # else the drag may have no bound
-            yield row if sure else Missing("birth", name, "no drag gives birth to a fold")
+            yield row if sure else runner.missing(name, "no drag gives birth to a fold")
 
 
 PROTOCOLS = (

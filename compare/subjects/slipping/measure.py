@@ -27,7 +27,6 @@ from typing import Unpack
 
 import numpy as np
 
-from compare.kit import step_pairs
 from compare.kit.conditions import Conditions, state_of
 from compare.kit.programme import Protocol
 from compare.kit.record import (
@@ -37,11 +36,10 @@ from compare.kit.record import (
     Records,
     Sets,
     if_found,
-    measurement,
 )
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import dragged_speed, slip_unit, time_unit
-from compare.kit.settling import initial_condition, settle_groups
+from compare.kit.settling import settle_groups, starts_at
 from compare.kit.statistics import (
     Estimate,
     estimate,
@@ -51,7 +49,17 @@ from compare.kit.statistics import (
     uniform,
     zero_and_slope,
 )
-from compare.kit.step_pairs import DOUBT, EXTRAPOLATION, STEP_RATIO, Start, lag_error, polynomials
+from compare.kit.step_pairs import (
+    DOUBT,
+    EXTRAPOLATION,
+    HALF_WINDOW,
+    STEP_RATIO,
+    WINDOW_DEGREES,
+    Start,
+    lag_error,
+    polynomials,
+    random_state,
+)
 from compare.kit.tasks import Task
 from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
@@ -86,13 +94,13 @@ SMALL_SLIPS = (0.3, 0.15)
 """Those where one contact has to hold."""
 SLIPS_BESIDE = (1.2, 0.6, 0.3)
 """Those beside a slip that is there already, where the direction depends on the size."""
+FAST_SLIPS = (1.0, 0.5)
+"""Those of a ball that hangs on a smooth wall, and so goes fast."""
 
 
 AT_START = slope_error(
     np.arange(RECORD_SKIPPED, RECORD_STEPS + 1.0), RECORD_DEGREES[0]
-) / slope_error(
-    np.arange(-step_pairs.HALF_WINDOW, step_pairs.HALF_WINDOW + 1.0), step_pairs.WINDOW_DEGREES[0]
-)
+) / slope_error(np.arange(-HALF_WINDOW, HALF_WINDOW + 1.0), WINDOW_DEGREES[0])
 """Uncertainty of a rate at the start of a record, relative to that amid a window."""
 FRICTIONLESS = "without friction at both contacts there is nothing that rolls"
 
@@ -100,34 +108,24 @@ FRICTIONLESS = "without friction at both contacts there is nothing that rolls"
 def measure(runner: Runner, sets: Sets, records: Records) -> Measured:
     """gamma out of random states, along every arrow; of two sides their shares (69)."""
     rough = {name: p for name, p in sets.items() if p.mu and p.eta}
-    yield from (Missing("growth", name, FRICTIONLESS) for name in sets if name not in rough)
-    sides = [
-        push for name, p in rough.items() for push in _pushes(name, p, runner.sampling.growth_more)
-    ]
-    tasks = [push.tasks(runner) for pushes in sides for push in pushes]
+    yield from (runner.missing(name, FRICTIONLESS) for name in sets if name not in rough)
+    sides = [pushes for name, p in rough.items() for pushes in _pushes(runner, name, p)]
+    tasks = [push.tasks() for pushes in sides for push in pushes]
     runs = zip(tasks, runner.groups(tasks), strict=True)
-    left = Counter[tuple[str, Case, Case]]()
+    left = Counter[tuple[str, str]]()
     for pushes in sides:
         grown = []
         for push in pushes:
             own, pairs = next(runs)
             if isinstance(pairs, str):
-                why = f"from {push.inner.name} to {push.outer.name}: the run {pairs}"
-                yield Missing("growth", push.start.set, why)
-                continue
-            if value := growth(push, pairs):
+                yield runner.missing(push.start.set, f"{push.arrow}: the run {pairs}")
+            elif value := push.growth(pairs):
                 grown.append(value)
-                yield push.row(runner, "growth", "gamma", value, own)
-                continue
-            sized = ((size, slice(2 * k, 2 * k + 2)) for k, size in enumerate(push.sizes))
-            strays = (
-                push.following_case(runner, "growth", size, own[of], pairs[of])
-                for size, of in sized
-            )
-            if stray := next(filter(None, strays), None):
+                yield push.row("gamma", value, own)
+            elif stray := push.stray(own, pairs):
                 yield stray
             else:
-                left[push.start.set, push.inner, push.outer] += 1
+                left[push.start.set, push.arrow] += 1
         # the share of the side of negative slip with which the two growth rates cancel
         if len(grown) == 2:
             plus, minus = grown if pushes[0].n.sum() > pushes[1].n.sum() else grown[::-1]
@@ -138,10 +136,9 @@ def measure(runner: Runner, sets: Sets, records: Records) -> Measured:
                 ahead=plus.uncertainty * abs(minus.value),
                 back=minus.uncertainty * abs(plus.value),
             )
-            yield push.row(runner, "growth", "filippov_share", share, own)
-    for (name, inner, outer), count in left.items():
-        why = f"slips from {inner.name} to {outer.name} pass through several cases"
-        yield Missing("growth", name, why, count)
+            yield push.row("filippov_share", share, own)
+    for (name, arrow), count in left.items():
+        yield runner.missing(name, f"slips {arrow} pass through several cases", count)
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,33 +149,41 @@ class Push:
     ``dragged`` where the fluid pulls hard, ``rest`` in a fluid at rest, empty for a direction at
     random, ``held`` and ``stationary`` for `bounds`."""
 
+    runner: Runner
     start: Start
     inner: Case
     outer: Case
     n: Array  # direction, a unit vector (3,) of slip_x, slip_y, slip_z
 
     @property
+    def arrow(self) -> str:
+        """Between which cases, in words."""
+        return f"from {self.inner.name} to {self.outer.name}"
+
+    @property
     def sizes(self) -> tuple[float, ...]:
         """Sizes of slip, in units of `start_unit`."""
         if self.inner in (Case.RS, Case.SR):
             return SLIPS_BESIDE
+        if self.inner is Case.NR and self.start.name == "stationary":
+            return FAST_SLIPS
         return SMALL_SLIPS if self.outer in (Case.RS, Case.SR) else LARGE_SLIPS
 
-    def pair(self, runner: Runner, size: float, divisor: int = 1) -> list[Task]:
+    def pair(self, size: float, divisor: int = 1) -> list[Task]:
         """Tasks with one size of slip and both time steps, divided by `divisor`."""
         p, x = self.start.p, self.start.x0.copy()
         x[SLIP_XYZ] += size * start_unit(p, x) * self.n
-        steps, step = RECORD_STEPS * divisor, coarse_step(p) / (step_pairs.STEP_RATIO * divisor)
+        steps, step = RECORD_STEPS * divisor, coarse_step(p) / (STEP_RATIO * divisor)
         return [
-            runner.task(p, x, steps * step, step / n, samples=steps * n)
-            for n in runner.sampling.halves
+            self.runner.task(p, x, steps * step, step / n, samples=steps * n)
+            for n in self.runner.sampling.halves
         ]
 
-    def tasks(self, runner: Runner) -> list[Task]:
+    def tasks(self) -> list[Task]:
         """Tasks with every size of slip and both time steps; of the engine on trial these are half
         as long, since the first ones of a run are seen in it for a while."""
-        divisor = 1 if runner.has_own_steps else 2
-        return [task for size in self.sizes for task in self.pair(runner, size, divisor)]
+        divisor = 1 if self.runner.has_own_steps else 2
+        return [task for size in self.sizes for task in self.pair(size, divisor)]
 
     def rates(self, run: Trajectory) -> Array:
         """Initial rates of the slip along n by either degree (2,); nan in another case."""
@@ -187,14 +192,46 @@ class Push:
         alike = [self.outer, Case.RN] if self.start.name == "rest" else [self.outer]
         if not np.isin(run.case[record], alike).all():
             return np.full(2, np.nan)
-        return step_pairs.polynomials(
-            run.time[record], run.x[record, SLIP_XYZ] @ self.n, RECORD_DEGREES
-        )[1]
+        return polynomials(run.time[record], run.x[record, SLIP_XYZ] @ self.n, RECORD_DEGREES)[1]
+
+    def growth(self, runs: Sequence[Trajectory]) -> Estimate | None:
+        """gamma for a vanishing size and step from `tasks`, None if a record left the case.
+
+        Its uncertainty is what the step and a degree of the polynomials change, and for three sizes
+        a third of what the third one changes, since the next would change less."""
+        coarse, fine = (np.array([self.rates(run) for run in runs[k::2]]) for k in (0, 1))
+        if np.isnan(coarse).any() or np.isnan(fine).any():
+            return None
+        best = fine + (fine - coarse) * EXTRAPOLATION
+        value, lower = limit_of_no_size(best)
+        step = limit_of_no_size(fine - coarse)[0] * DOUBT
+        size = (value - limit_of_no_size(best[-2:])[0]) / 3
+        p = self.start.p
+        # Slip at the wall alone of a ball that rolls on the floor neither turns nor changes its
+        # load.
+        least = lag_error(p) * (1.0 if self.outer is Case.RS else AT_START) * slip_unit(p)
+        return estimate(
+            value,
+            time_step=abs(float(step)),
+            degree=uniform(abs(float(value - lower))),
+            push=uniform(abs(float(size))),
+            lag=least,
+        )
+
+    def stray(self, tasks: Sequence[Task], runs: Sequence[Trajectory]) -> Measurement | None:
+        """The case that follows the first slip, of pairs with each of the `sizes`, that doesn't
+        last; None if all do, or steps differ."""
+        pairs = zip(tasks[::2], tasks[1::2], runs[::2], runs[1::2], strict=True)
+        for size, (*own, coarse, fine) in zip(self.sizes, pairs, strict=False):
+            ended = int(fine.case[-1])
+            same = all(np.all(run.case[-RECORD_SETTLED:] == ended) for run in (coarse, fine))
+            if same and ended != self.outer:
+                slip, time = size * start_unit(self.start.p, self.start.x0), float(fine.time[-1])
+                return self.row("case", ended, own, slip=slip, time=time)
+        return None
 
     def row(
         self,
-        runner: Runner,
-        protocol: str,
         quantity: str,
         value: Estimate | float,
         tasks: Sequence[Task],
@@ -203,52 +240,8 @@ class Push:
         """A measurement of the push, with its state and direction as conditions."""
         start, (n_x, n_y, n_z) = self.start, self.n.tolist()
         cases = Conditions(inner=self.inner.name, outer=self.outer.name, by=start.name)
-        along = cases | state_of(start.x0) | Conditions(n_x=n_x, n_y=n_y, n_z=n_z)
-        return measurement(
-            runner, protocol, start.set, start.p, quantity, value, tasks, **(along | at)
-        )
-
-    def following_case(
-        self,
-        runner: Runner,
-        protocol: str,
-        size: float,
-        tasks: Sequence[Task],
-        runs: Sequence[Trajectory],
-    ) -> Measurement | None:
-        """The case that follows where slip doesn't last; None if it does, or steps differ."""
-        fine = runs[1]
-        ended = int(fine.case[-1])
-        if ended == self.outer or any(np.any(run.case[-RECORD_SETTLED:] != ended) for run in runs):
-            return None
-        slip = size * start_unit(self.start.p, self.start.x0)
-        return self.row(
-            runner, protocol, "case", ended, tasks, slip=slip, time=float(fine.time[-1])
-        )
-
-
-def growth(push: Push, runs: Sequence[Trajectory]) -> Estimate | None:
-    """gamma for a vanishing size and step from `Push.tasks`, None if a record left the case.
-
-    Its uncertainty is what the step and a degree of the polynomials change, and for three sizes a
-    third of what the third one changes, since the next would change less."""
-    coarse, fine = (np.array([push.rates(run) for run in some]) for some in (runs[::2], runs[1::2]))
-    if np.isnan(coarse).any() or np.isnan(fine).any():
-        return None
-    best = fine + (fine - coarse) * step_pairs.EXTRAPOLATION
-    value, lower = limit_of_no_size(best)
-    step = limit_of_no_size(fine - coarse)[0] * step_pairs.DOUBT
-    size = (value - limit_of_no_size(best[-2:])[0]) / 3
-    p = push.start.p
-    # Slip at the wall alone of a ball that rolls on the floor neither turns nor changes its load.
-    least = step_pairs.lag_error(p) * (1.0 if push.outer is Case.RS else AT_START) * slip_unit(p)
-    return estimate(
-        value,
-        time_step=abs(float(step)),
-        degree=uniform(abs(float(value - lower))),
-        push=uniform(abs(float(size))),
-        lag=least,
-    )
+        at = cases | state_of(start.x0) | Conditions(n_x=n_x, n_y=n_y, n_z=n_z) | at
+        return self.runner.measurement(start.set, start.p, quantity, value, tasks, **at)
 
 
 def limit_of_no_size(rates: Array) -> Array:
@@ -257,27 +250,24 @@ def limit_of_no_size(rates: Array) -> Array:
     return np.asarray((first[0] - 6 * before + 8 * last) / 3 if first else 2 * last - before)
 
 
-def _pushes(name: str, p: Parameters, more: int) -> Iterator[list[Push]]:
+def _pushes(runner: Runner, name: str, p: Parameters) -> Iterator[list[Push]]:
     """Pushes out of states of a set; two where one contact alone slips, to either side."""
     rng = np.random.default_rng([61, *name.encode()])
     slow = 0.4 / time_unit(p) * min(1.0, math.sqrt(p.mu / max(p.eta, p.j)))
     going = Start(name, p.replace(omega_0=slow), "sideways", State(omega_c=slow).stacked())
-    yield [
-        Push(going, Case.RR, Case.SS, np.array([0.3, 1.0, 0.3]) / np.linalg.norm([0.3, 1.0, 0.3]))
-    ]
+    sideways = np.array([0.3, 1.0, 0.3])
+    yield [Push(runner, going, Case.RR, Case.SS, sideways / np.linalg.norm(sideways))]
     still = Start(name, p.replace(omega_0=0.0), "rest", np.zeros(8))
     for side in (1, -1):
-        yield [Push(still, Case.RR, Case.RS, np.array([0.0, side, 0.0]))]
+        yield [Push(runner, still, Case.RR, Case.RS, np.array([0.0, side, 0.0]))]
         # It sinks half as fast as the fluid pulls it along the wall.
-        sinking = State.of(step_pairs.random_state(Case.NR, p, rng))._replace(
-            v_y=-0.5 * dragged_speed(p)
-        )
+        sinking = State.of(random_state(Case.NR, p, rng))._replace(v_y=-0.5 * dragged_speed(p))
         dragged = p.replace(omega_0=sinking.omega_c + dragged_speed(p) / p.R)
         start = Start(name, dragged, "dragged", sinking.stacked())
-        yield [Push(start, Case.NR, Case.NS, np.array([0.0, 0.8 * side, 0.6]))]
+        yield [Push(runner, start, Case.NR, Case.NS, np.array([0.0, 0.8 * side, 0.6]))]
     for (inner, outer), count in PUSHES.items():
-        for _ in range(count * more):
-            x = State.of(step_pairs.random_state(inner, p, rng))
+        for _ in range(count * runner.sampling.growth_more):
+            x = State.of(random_state(inner, p, rng))
             # The orbit is one at which both contacts press, whichever way friction acts.
             if outer is Case.SR:  # the spin axis turns with the orbit, and the wall alone turns it
                 x = x._replace(omega_c=math.sqrt(rng.uniform(0.4, 0.8) * p.g / (p.j * p.R)))
@@ -297,13 +287,9 @@ def _pushes(name: str, p: Parameters, more: int) -> Iterator[list[Push]]:
             n = np.zeros(3)
             n[free] = rng.choice([-1, 1], len(free)) * rng.uniform(0.4, 1.0, len(free))
             n /= np.linalg.norm(n)
-            start = Start(
-                name, p.replace(omega_0=float(x.omega_c * rng.uniform(0.6, 1.4))), "", x.stacked()
-            )
-            yield [
-                Push(start, inner, outer, side * n)
-                for side in ((1, -1) if len(free) == 1 else (1,))
-            ]
+            q = p.replace(omega_0=float(x.omega_c * rng.uniform(0.6, 1.4)))
+            start, sides = Start(name, q, "", x.stacked()), (1, -1) if len(free) == 1 else (1,)
+            yield [Push(runner, start, inner, outer, side * n) for side in sides]
 
 
 def start_unit(p: Parameters, x: Array) -> float:
@@ -315,57 +301,48 @@ def steepest(runner: Runner, sets: Sets, records: Records) -> Measured:
     """The direction in which slip out of NR grows the most: of the first harmonic."""
     rough = {name: p for name, p in sets.items() if p.eta and p.c}
     why = "without friction at the wall, or drag, no direction stands out"
-    yield from (Missing("steepest", name, why) for name in sets if name not in rough)
+    yield from (runner.missing(name, why) for name in sets if name not in rough)
     # random states, each pushed at angles all round from slip_z to slip_y of the wall's contact
     fans = []
     for name, p in rough.items():
         rng = np.random.default_rng([58, *name.encode()])
         for _ in range(runner.sampling.steepest_states):
-            x = step_pairs.random_state(Case.NR, p, rng)
+            x = random_state(Case.NR, p, rng)
             # The fluid pulls along the orbit, by half the weight to three times it: that turns the
             # direction.
             pull = rng.choice([-1, 1]) * rng.uniform(0.5, 3.0)
-            start = Start(
-                name, p.replace(omega_0=State.of(x).omega_c + pull * dragged_speed(p) / p.R), "", x
-            )
-            angles = np.linspace(0.0, 2 * np.pi, 8, endpoint=False)
-            fans.append(
-                [
-                    Push(start, Case.NR, Case.NS, np.array([0.0, np.sin(b), np.cos(b)]))
-                    for b in angles
-                ]
-            )
-    runs = runner.groups([push.tasks(runner) for fan in fans for push in fan])
+            q = p.replace(omega_0=State.of(x).omega_c + pull * dragged_speed(p) / p.R)
+            betas = np.linspace(0.0, 2 * np.pi, 8, endpoint=False)
+            ways = (np.array([0.0, np.sin(beta), np.cos(beta)]) for beta in betas)
+            start = Start(name, q, "", x)
+            fans.append([Push(runner, start, Case.NR, Case.NS, n) for n in ways])
+    runs = runner.groups([push.tasks() for fan in fans for push in fan])
     for fan in fans:
         why, grown = "slip along some direction did not last, or no direction stands out", []
         for push in fan:
             if isinstance(got := next(runs), str):
                 why = f"the run {got}"
-            elif value := growth(push, got):
+            elif value := push.growth(got):
                 grown.append(value)
-        start, tasks = fan[0].start, [task for push in fan for task in push.tasks(runner)]
+        start, tasks = fan[0].start, [task for push in fan for task in push.tasks()]
         angle = math.nan
         if len(grown) == len(fan):
             harmonics = np.fft.rfft([g.value for g in grown]) * 2 / len(fan)
             angle = float(-np.angle(harmonics[1]))
         if not abs(angle) < 3:  # one near pi may come out on either side of it
-            yield Missing("steepest", start.set, why)
+            yield runner.missing(start.set, why)
             continue
         scatter = np.sqrt(2.0 / len(fan)) * max(g.uncertainty for g in grown)
         others = np.arange(2, len(harmonics)) @ np.abs(harmonics[2:])
         first = float(np.abs(harmonics[1]))
         beta = estimate(angle, 1 / first, rates=float(scatter), harmonics=float(others))
-        yield measurement(
-            runner, "steepest", start.set, start.p, "steepest", beta, tasks, **state_of(start.x0)
-        )
+        yield runner.measurement(start.set, start.p, "steepest", beta, tasks, **state_of(start.x0))
 
 
 AROUND = (0.7, 1.3)
 """The second two flows, divided by the zero that the first two show."""
 AROUND_BENT = (0.8, 1.1)
 """The same where the law of drag bends the line."""
-FAST_SLIPS = (1.0, 0.5)
-"""As `Push.sizes`, of a ball that hangs on a smooth wall, and so goes fast."""
 MOST_BEYOND = 2.1
 """Largest zero recorded, divided by the largest value at which slip stayed in its case."""
 MOST_FOLLOWED = 100.0
@@ -376,71 +353,36 @@ HANGING = (1.05, 1.6, 1.3)
 
 def bounds(runner: Runner, sets: Sets, records: Records) -> Measured:
     """Zero and slope of gamma along every line: from two flows, then two more at the zero."""
-    yield from (
-        Missing("bounds", name, FRICTIONLESS) for name, p in sets.items() if not (p.mu and p.eta)
-    )
-    sets = {name: p for name, p in sets.items() if p.mu and p.eta}
-    lines = [line for name, p in sets.items() for line in _lines_from_rolling(name, p)]
+    rough = {name: p for name, p in sets.items() if p.mu and p.eta}
+    yield from (runner.missing(name, FRICTIONLESS) for name in sets if name not in rough)
+    hanging = _hanging(runner, rough, records)
+    lines = [line for name, p in rough.items() for line in _lines_from_rolling(runner, name, p)]
+    lines += hanging.values()
+    why = "no flow was found at which the wall alone carries the ball"
+    yield from (runner.missing(name, why) for name in rough if name not in hanging)
+    first = _growths(runner, [line.pushes[:2] for line in lines])
+    around = [line.around(seen.points[1]) for line, seen in zip(lines, first, strict=True)]
+    for line, seen, more in zip(lines, first, _growths(runner, around), strict=True):
+        yield from _zero_and_slope(line, seen, more)
+
+
+def _hanging(runner: Runner, sets: Sets, records: Records) -> dict[str, Crossing]:
+    """Pushes out of settled states of sets whose wall alone carries the ball, by set."""
     ends = {name: end.value for name in sets if (end := records.threshold(name, "omega_02"))}
     starts = [
-        [
-            initial_condition(name, sets[name].replace(omega_0=end * factor), "on the wall")
-            for factor in HANGING
-        ]
+        starts_at(name, sets[name], "on the wall", [end * factor for factor in HANGING])
         for name, end in ends.items()
     ]
-    # sets whose wall alone carries the ball: there it is pushed out of settled states
-    hangs = set[str]()
+    lines = {}
     for name, states in zip(ends, settle_groups(runner, starts), strict=True):
-        if not any(state.failure or state.case is not Case.NR for state in states):
-            hangs.add(name)
-            rides = [
-                (state.start.p, np.array([sets[name].R, 0, *state.mean[2:4], 0, 0, 0, 0]))
-                for state in states
-            ]
-            begun = [Start(name, p, "stationary", x) for p, x in rides]
-            lines.append(
-                Crossing(
-                    tuple(Push(start, Case.NR, Case.NS, np.array([0, 0, 1])) for start in begun)
-                )
-            )
-    for name in (name for name in sets if name not in hangs):
-        yield Missing("bounds", name, "no flow was found at which the wall alone carries the ball")
-    first = _growths(runner, [line.pushes[:2] for line in lines])
-    around = _growths(
-        runner, [line.around(seen.points[1]) for line, seen in zip(lines, first, strict=True)]
-    )
-    for line, seen, more in zip(lines, first, around, strict=True):
-        push = line.pushes[0]
-        square = "_square" if line.power == 2 else ""
-        tasks = [*seen.tasks, *more.tasks]
-        name, slips = push.start.set, f"from {push.inner.name} to {push.outer.name}"
-        if np.isnan(seen.points[1]).any():
-            yield from seen.strays or [
-                Missing("bounds", name, f"slips {slips} pass through several cases", 2)
-            ]
-            continue
-        points = np.concatenate([seen.points, more.points], axis=1)
-        flows, gamma, noise = points[:, ~np.isnan(points[1])]
-        # What the step changes may be little by chance at one of the flows.
-        q, noise = flows**line.power, np.maximum(noise, seen.points[2].max())
-        if line.is_curved:
-            zero, slope = zero_and_slope(q, gamma, noise)
-        else:  # the points share causes of error: more of them don't reduce the uncertainty
-            zero, slope = straight_line(q, gamma, noise * math.sqrt(len(q)))
-        growth = f"growth of slip {slips}, {push.start.name},"
-        if abs(zero.value) <= MOST_BEYOND * np.abs(q).max():
-            yield if_found(
-                push.row(runner, "bounds", f"gamma_zero{square}", zero, tasks),
-                f"{growth} has no zero",
-            )
-        else:
-            why = f"{growth} is zero only far beyond the flows at which the ball stays in this case"
-            yield Missing("bounds", name, why)
-        yield if_found(
-            push.row(runner, "bounds", f"gamma_slope{square}", slope, tasks),
-            f"{growth} has no slope",
-        )
+        if all(state.settled_in(Case.NR) for state in states):
+            pushes = []
+            for state in states:
+                x = np.array([sets[name].R, 0, *state.mean[2:4], 0, 0, 0, 0])
+                rides = replace(state.start, name="stationary", x0=x)
+                pushes.append(Push(runner, rides, Case.NR, Case.NS, np.array([0, 0, 1])))
+            lines[name] = Crossing(tuple(pushes))
+    return lines
 
 
 @dataclass(frozen=True, eq=False)
@@ -498,8 +440,8 @@ def _growths(runner: Runner, rows: Sequence[Sequence[Push]]) -> list[Growths]:
     It is uncertain by what the step and the degree of the polynomials change."""
     tasks, divisor = [], runner.sampling.bounds_divisor
     for push in (push for pushes in rows for push in pushes):
-        large, small = push.sizes if push.inner is not Case.NR else FAST_SLIPS
-        tasks.append([*push.pair(runner, large, divisor), push.pair(runner, small, divisor)[1]])
+        large, small = (push.pair(size, divisor) for size in push.sizes)
+        tasks.append([*large, small[1]])
     results, found = zip(tasks, runner.groups(tasks), strict=True), []
     for pushes in rows:
         points, used, strays = [], list[Task](), list[Measurement | Missing]()
@@ -507,13 +449,11 @@ def _growths(runner: Runner, rows: Sequence[Sequence[Push]]) -> list[Growths]:
             p, (own, runs) = push.start.p, next(results)
             used += own
             if isinstance(runs, str):
-                strays.append(
-                    Missing("bounds", push.start.set, f"from {push.inner.name}: the run {runs}", 2)
-                )
+                why = f"from {push.inner.name}: the run {runs}"
+                strays.append(runner.missing(push.start.set, why, 2))
                 points.append((p.omega_0, math.nan, math.nan))
                 continue
-            size = push.sizes[0] if push.inner is not Case.NR else FAST_SLIPS[0]
-            if stray := push.following_case(runner, "bounds", size, own[:2], runs[:2]):
+            if stray := push.stray(own[:2], runs[:2]):
                 strays.append(stray)
             coarse, fine, half = (push.rates(run) for run in runs)
             best, change = limit_of_no_size(np.array([fine, half])), (fine - coarse)[0]
@@ -525,7 +465,33 @@ def _growths(runner: Runner, rows: Sequence[Sequence[Push]]) -> list[Growths]:
     return found
 
 
-def _lines_from_rolling(name: str, p: Parameters) -> Iterator[Crossing]:
+def _zero_and_slope(line: Crossing, seen: Growths, more: Growths) -> Measured:
+    """Measurements of zero and slope of gamma along a line, from what was seen at the first flows
+    and around the zero."""
+    push, runner, tasks = line.pushes[0], line.pushes[0].runner, [*seen.tasks, *more.tasks]
+    if np.isnan(seen.points[1]).any():
+        why = f"slips {push.arrow} pass through several cases"
+        yield from seen.strays or [runner.missing(push.start.set, why, 2)]
+        return
+    points = np.concatenate([seen.points, more.points], axis=1)
+    flows, gamma, noise = points[:, ~np.isnan(points[1])]
+    # What the step changes may be little by chance at one of the flows.
+    q, noise = flows**line.power, np.maximum(noise, seen.points[2].max())
+    if line.is_curved:
+        zero, slope = zero_and_slope(q, gamma, noise)
+    else:  # the points share causes of error: more of them don't reduce the uncertainty
+        zero, slope = straight_line(q, gamma, noise * math.sqrt(len(q)))
+    growth = f"growth of slip {push.arrow}, {push.start.name},"
+    square = "_square" if line.power == 2 else ""
+    if abs(zero.value) <= MOST_BEYOND * np.abs(q).max():
+        yield if_found(push.row(f"gamma_zero{square}", zero, tasks), f"{growth} has no zero")
+    else:
+        why = f"{growth} is zero only far beyond the flows at which the ball stays in this case"
+        yield runner.missing(push.start.set, why)
+    yield if_found(push.row(f"gamma_slope{square}", slope, tasks), f"{growth} has no slope")
+
+
+def _lines_from_rolling(runner: Runner, name: str, p: Parameters) -> Iterator[Crossing]:
     """Pushes out of RR at flows along a line, scaled by friction and inertia, by bound."""
     unit = time_unit(p)
     slow = 0.5 / unit * min(1.0, math.sqrt(p.mu / max(p.eta, p.j)))
@@ -546,7 +512,7 @@ def _lines_from_rolling(name: str, p: Parameters) -> Iterator[Crossing]:
             Start(name, p.replace(omega_0=flow), by, State(omega_c=orbit).stacked())
             for flow, orbit in zip(flows, orbits, strict=True)
         )
-        yield Crossing(tuple(Push(start, Case.RR, outer, np.array(n)) for start in starts))
+        yield Crossing(tuple(Push(runner, start, Case.RR, outer, np.array(n)) for start in starts))
 
 
 ARROWS: dict[tuple[Case, Case], tuple[float, float, float]] = {
@@ -595,7 +561,7 @@ def lift(runner: Runner, sets: Sets, records: Records) -> Measured:
                 if isinstance(got, str)
                 else "the ball doesn't stay in it at any orbit"
             )
-            yield Missing("lift", arrow.set, f"out of {arrow.inner.name}: {why}")
+            yield runner.missing(arrow.set, f"out of {arrow.inner.name}: {why}")
         elif leaves is None:
             fastest = float(runs[-1].omega_c[0])
             yield arrow.row("lifts", fastest, 0.0, tasks)
@@ -605,14 +571,14 @@ def lift(runner: Runner, sets: Sets, records: Records) -> Measured:
                 yield if_found(row, f"the force of the floor in {arrow.inner.name} is none")
         elif leaves is not arrow.outer:
             why = f"a ball that leaves the floor out of {arrow.inner.name} ends in {leaves.name}"
-            yield Missing("lift", arrow.set, why)
+            yield runner.missing(arrow.set, why)
         elif isinstance(near, str) or (onset := _onset(near)) is None:
             why = (
                 f"the run {near}"
                 if isinstance(near, str)
                 else "the contact at the floor opens and closes"
             )
-            yield Missing("lift", arrow.set, f"where the ball leaves {arrow.inner.name} {why}")
+            yield runner.missing(arrow.set, f"where the ball leaves {arrow.inner.name} {why}")
         else:
             yield arrow.row("lift_onset", 1 / time_unit(arrow.p), onset, later)
 
@@ -672,7 +638,7 @@ class Arrow:
         """A measurement along the arrow, with the state at one orbit as conditions."""
         p, x0 = self.start(omega_c)
         at = Conditions(inner=self.inner.name, outer=self.outer.name) | state_of(x0)
-        return measurement(self.runner, "lift", self.set, p, quantity, value, tasks, **at)
+        return self.runner.measurement(self.set, p, quantity, value, tasks, **at)
 
 
 def _force(run: Trajectory) -> Estimate | None:

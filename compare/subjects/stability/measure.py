@@ -26,7 +26,7 @@ from compare.kit.conditions import Conditions, state_of
 from compare.kit.engines import STUDY_SLIP
 from compare.kit.programme import Protocol
 from compare.kit.quantities import quantity
-from compare.kit.record import Measured, Measurement, Missing, Records, Sets, measurement
+from compare.kit.record import Measured, Measurement, Missing, Records, Sets
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.settling import SOLVED, SPIN, physical_case, safe_height
@@ -47,9 +47,6 @@ from model.arrays import Array
 from model.cases import TRAITS
 from model.drag import QUADRATIC, STOKES
 from model.kinematics import SLIP_XYZ, VARIABLES, slip_speeds, state_units
-
-PROTOCOL = "rates"
-
 
 PUSH_RECORD = (64, 256)
 """Of what follows a push: its length in coarse steps, about 3 sqrt(R/g), and samples."""
@@ -76,16 +73,12 @@ Exponents = npt.NDArray[np.complex128]
 
 def measure(runner: Runner, sets: Sets, records: Records) -> Measured:
     """All exponents of settled states in the six cases in which a ball can go round for ever."""
-    found = [
-        each
-        for name, p in sets.items()
-        for each in chosen_states(records, name, p, runner.sampling.rates_more)
-    ]
+    found = [each for name, p in sets.items() for each in chosen_states(runner, records, name, p)]
     yield from (each for each in found if isinstance(each, Missing))
     pushed = [each for each in found if isinstance(each, Pushed)]
     yield from (each.missing(NOT_LINEAR, rows=each.numbers) for each in pushed if each.bent)
     states = [each for each in pushed if not each.bent]
-    tasks = [state.tasks(runner) for state in states]
+    tasks = [state.tasks() for state in states]
     for state, own, runs in zip(states, tasks, runner.groups(tasks), strict=True):
         if isinstance(runs, str):
             yield state.missing(f"a run {runs}")
@@ -100,9 +93,9 @@ def measure(runner: Runner, sets: Sets, records: Records) -> Measured:
         if min(map(len, answers)) < (48 if state.case is Case.SR else 8):
             yield state.missing("pushed, the ball doesn't stay in this case")
             continue
-        (_, step), start = state.steps(runner), state.start
+        (_, step), start = state.steps, state.start
         at = Conditions(case=state.case.name) | state_of(start.x0)
-        row = partial(measurement, runner, PROTOCOL, start.set, start.p, tasks=own[-count:], **at)
+        row = partial(runner.measurement, start.set, start.p, tasks=own[-count:], **at)
         modes = spectrum(state, answers, step)
         yield from _modes(state, modes, step, row)
         yield from _responses(state, answers, row)
@@ -112,6 +105,7 @@ def measure(runner: Runner, sets: Sets, records: Records) -> Measured:
 class Pushed:
     """A settled state, from which the ball is pushed."""
 
+    runner: Runner
     start: Start
     case: Case
 
@@ -152,14 +146,13 @@ class Pushed:
         seen = propagator_error(record, lag) if self.start.p.drag == STOKES else most
         return min(seen, most)
 
-    def steps(self, runner: Runner) -> tuple[float, float]:
+    @property
+    def steps(self) -> tuple[float, float]:
         """The longer and the shorter time step, s."""
-        coarse, fine = (
-            runner.sampling.rates_leaning
-            if self.case is Case.SR
-            else runner.sampling.rates_divisors
-        )
-        return coarse_step(self.start.p) / coarse, coarse_step(self.start.p) / fine
+        sampling, step = self.runner.sampling, coarse_step(self.start.p)
+        leans = self.case is Case.SR
+        coarse, fine = sampling.rates_leaning if leans else sampling.rates_divisors
+        return step / coarse, step / fine
 
     @property
     def bent(self) -> bool:
@@ -190,9 +183,9 @@ class Pushed:
             if contact == "S"
         )
 
-    def tasks(self, runner: Runner) -> list[Task]:
+    def tasks(self) -> list[Task]:
         """Runs for each of the `sizes`: every active variable is pushed, up and down."""
-        p, step, (coarse, fine) = self.start.p, coarse_step(self.start.p), self.steps(runner)
+        p, step, (coarse, fine) = self.start.p, coarse_step(self.start.p), self.steps
         lasts, samples = self.record
         tasks = []
         for size, h in zip(self.sizes, (coarse, fine, fine), strict=False):
@@ -200,7 +193,7 @@ class Pushed:
                 for push in (unit, -unit):
                     x = self.start.x0.copy()
                     x[k] += push
-                    tasks.append(runner.task(p, x, lasts * step, h, samples=samples))
+                    tasks.append(self.runner.task(p, x, lasts * step, h, samples=samples))
         return tasks
 
     def missing(self, why: str, modes: int = 0, rows: int = 0) -> Missing:
@@ -208,11 +201,11 @@ class Pushed:
         and why; of so many `rows` if they are more."""
         at = f"{self.case.name} at omega_0 = {self.start.p.omega_0:.4g} rad/s"
         count = rows or 2 * (modes or len(self.active))
-        return Missing(PROTOCOL, self.start.set, f"{at}: {why}", count)
+        return self.runner.missing(self.start.set, f"{at}: {why}", count)
 
 
 def chosen_states(
-    records: Records, name: str, p: Parameters, more: float
+    runner: Runner, records: Records, name: str, p: Parameters
 ) -> Iterator[Pushed | Missing]:
     """States of a set to be pushed: one that spins on the spot next to the wall, and several
     settled ones of each case.
@@ -220,7 +213,7 @@ def chosen_states(
     Where there are fewer that can be pushed, the rest is missing."""
     unit = time_unit(p)
     spinning = State(slip_y=SPIN / unit * p.R / p.r).stacked()
-    yield Pushed(Start(name, p.replace(omega_0=0.0), "spinning", spinning), Case.RS)
+    yield Pushed(runner, Start(name, p.replace(omega_0=0.0), "spinning", spinning), Case.RS)
     values: dict[tuple[Parameters, Case], dict[str, float]] = {}
     for m in records.select("settled", where=lambda m: m.set == name and m.quantity in VARIABLES):
         values.setdefault((m.parameters, physical_case(m.case)), {})[m.quantity] = m.value
@@ -229,13 +222,13 @@ def chosen_states(
     for (q, case), value in values.items():
         x = State(**value | {"y": 0.0, "h": 0.0, "v_h": 0.0})
         raised = x._replace(y=safe_height(q)) if case.A is Contact.N else x
-        states.append(Pushed(Start(name, q, "settled", raised.stacked()), case))
+        states.append(Pushed(runner, Start(name, q, "settled", raised.stacked()), case))
         if case is Case.NR:
-            states.append(Pushed(Start(name, q, "settled", x.stacked()), Case.SR))
+            states.append(Pushed(runner, Start(name, q, "settled", x.stacked()), Case.SR))
     # no ball settles to going round with the fluid, but one that starts so goes on so
     if p.drag == QUADRATIC:
         q, x = p.replace(omega_0=0.5 / unit), State(omega_c=0.5 / unit)
-        states.append(Pushed(Start(name, q, "settled", x.stacked()), Case.RR))
+        states.append(Pushed(runner, Start(name, q, "settled", x.stacked()), Case.RR))
     for case, most in STATES.items():
         of = sorted(
             (each for each in states if each.case is case), key=lambda each: each.start.p.omega_0
@@ -243,15 +236,13 @@ def chosen_states(
         alike = [state for state in of if state.fast]
         if case is Case.SR:  # in the fastest flows the floor is unloaded within a few samples
             alike = alike[: math.ceil(2 / 3 * len(alike))]
-        count = math.ceil(more * most)
+        count = math.ceil(runner.sampling.rates_more * most)
         places = {int((k + 0.5) * len(alike) / count) for k in range(count)} if alike else set()
         yield from (alike[k] for k in sorted(places))
         if (lacking := min(count, len(of)) - len(places)) > 0 or not of:
-            why = (
-                f"{len(alike)} of {len(of)} settled states of {case.name} slip fast enough for a "
-                "push"
-            )
-            yield Missing(PROTOCOL, name, why, max(lacking, 0) * 2 * len(TRAITS[case].active))
+            why = f"{len(alike)} of {len(of)} settled states of {case.name} slip fast enough for a "
+            why += "push"
+            yield runner.missing(name, why, max(lacking, 0) * 2 * len(TRAITS[case].active))
 
 
 def push_response(state: Pushed, size: float, runs: Sequence[Trajectory]) -> Array:

@@ -17,7 +17,7 @@ from compare.kit import settling
 from compare.kit.conditions import Conditions
 from compare.kit.programme import Protocol
 from compare.kit.quantities import quantity
-from compare.kit.record import Measured, Measurement, Missing, Records, Sets, measurement
+from compare.kit.record import Measured, Measurement, Missing, Records, Sets
 from compare.kit.runner import Runner
 from compare.kit.scales import time_unit
 from compare.kit.settling import SettlingCriteria, SteadyState
@@ -25,8 +25,6 @@ from compare.kit.statistics import Estimate
 from compare.kit.step_pairs import Start, unlike
 from model import Case, State
 from model.drag import QUADRATIC
-
-PROTOCOL = "settled"
 
 
 def measure(runner: Runner, sets: Sets, records: Records) -> Measured:
@@ -37,24 +35,18 @@ def measure(runner: Runner, sets: Sets, records: Records) -> Measured:
     starts = []
     for name, p in sets.items():
         for how, flows in runner.sampling.settled_starts:
-            starts += [
-                settling.initial_condition(name, p.replace(omega_0=flow / time_unit(p)), how)
-                for flow in flows
-            ]
+            starts += settling.starts_at(name, p, how, [flow / time_unit(p) for flow in flows])
         spinning = State(slip_y=settling.SPIN / time_unit(p) * p.R / p.r)
         starts.append(Start(name, p.replace(omega_0=0.0), "spinning", spinning.stacked()))
-    for state in settling.settle(
-        runner, starts, SettlingCriteria(sharp=sharp, loose=runner.sampling.settled_loose)
-    ):
+    criteria = SettlingCriteria(sharp=sharp, loose=runner.sampling.settled_loose)
+    for state in settling.settle(runner, starts, criteria):
         if state.failure:
-            yield _unsettled(state, 1)
+            yield _unsettled(runner, state, 1)
         else:
             yield _row(runner, state, "case", state.case)
         if why := "no values of it" if state.failure else _why_drag_fades(state):
             why = f"{state.case.name} at omega_0 = {state.start.p.omega_0:.4g} rad/s: {why}"
-            without[Attractor.of(state)] = Missing(
-                PROTOCOL, state.start.set, why, len(state.values)
-            )
+            without[Attractor.of(state)] = runner.missing(state.start.set, why, len(state.values))
         else:
             alike.setdefault(Attractor.of(state), []).append(state)
     yield from (each for kind, each in without.items() if kind not in alike)
@@ -86,43 +78,31 @@ def _why_drag_fades(state: SteadyState) -> str:
     p = state.start.p
     if p.drag != QUADRATIC:
         return ""
-    Re = (
-        2
-        * p.r
-        / p.nu_f
-        * math.hypot(State.of(state.mean).v_y, p.R * (State.of(state.mean).omega_c - p.omega_0))
-    )
+    mean = State.of(state.mean)
+    Re = 2 * p.r / p.nu_f * math.hypot(mean.v_y, p.R * (mean.omega_c - p.omega_0))
     rate = p.c * (p.C_D / 24 * Re)  # at which the fluid would stop a free ball
-    return (
-        ""
-        if rate * settling.duration(p) >= 10
-        else "quadratic drag fades with the lag, so that a small lag hardly dies out"
-    )
+    if rate * settling.duration(p) >= 10:
+        return ""
+    return "quadratic drag fades with the lag, so that a small lag hardly dies out"
 
 
-def _values(
-    runner: Runner, same: Sequence[SteadyState], fine: SteadyState, protocol: str = PROTOCOL
-) -> Measured:
+def _values(runner: Runner, same: Sequence[SteadyState], fine: SteadyState) -> Measured:
     """Values of a settled state with half the step; uncertain by step and start."""
-    p = fine.start.p
+    p, divisor = fine.start.p, runner.sampling.settled_divisor
     if why := settling.not_found_again(same[0], fine):
-        yield _unsettled(replace(fine, failure=why), len(fine.values), protocol)
-    else:
-        for group in settling.ERROR_GROUPS:
-            sizes = {
-                n: quantity(n).size(p)
-                for n in group
-                if all(n in each.values for each in (fine, *same))
-            }
-            changes = [
-                max(abs(s.values[n].value - fine.values[n].value) for s in same) / size
-                for n, size in sizes.items()
-            ]
-            divisor = runner.sampling.settled_divisor
-            for (n, size), change in zip(sizes.items(), unlike(np.array(changes)), strict=True):
-                off = float(change) * size
-                sure = settling.with_changes(fine.values[n], off, p, size, divisor)
-                yield _row(runner, fine, n, sure, protocol)
+        yield _unsettled(runner, replace(fine, failure=why), len(fine.values))
+        return
+    for group in settling.ERROR_GROUPS:
+        shown = [n for n in group if all(n in each.values for each in (fine, *same))]
+        sizes = [quantity(n).size(p) for n in shown]
+        changes = [
+            max(abs(s.values[n].value - fine.values[n].value) for s in same) / size
+            for n, size in zip(shown, sizes, strict=True)
+        ]
+        for n, size, change in zip(shown, sizes, unlike(np.array(changes)), strict=True):
+            off = float(change) * size
+            sure = settling.with_changes(fine.values[n], off, p, size, divisor)
+            yield _row(runner, fine, n, sure)
 
 
 def mirrored(runner: Runner, sets: Sets, records: Records) -> Measured:
@@ -135,28 +115,26 @@ def mirrored(runner: Runner, sets: Sets, records: Records) -> Measured:
     settled = []
     for state in settling.settle(runner, starts):
         if state.failure:
-            yield _unsettled(state, 1 + len(state.values), "mirrored")
+            yield _unsettled(runner, state, 1 + len(state.values))
         else:
             settled.append(state)
-            yield _row(runner, state, "case", state.case, "mirrored")
+            yield _row(runner, state, "case", state.case)
     for state, fine in zip(settled, settling.settle_finer(runner, settled), strict=True):
-        yield from _values(runner, [state], fine, "mirrored")
+        yield from _values(runner, [state], fine)
 
 
-def _unsettled(each: SteadyState, rows: int, protocol: str = PROTOCOL) -> Missing:
+def _unsettled(runner: Runner, each: SteadyState, rows: int) -> Missing:
     """A record of a start from which the ball did not settle, and of what it did last."""
     p = each.start.p
     at = f"omega_0 = {p.omega_0:.4g} rad/s (mu = {p.mu:.4g}, eta = {p.eta:.4g})"
     why = f"not settled at {at} (start: {each.start.name}): {each.failure}"
-    return Missing(protocol, each.start.set, why, rows)
+    return runner.missing(each.start.set, why, rows)
 
 
-def _row(
-    runner: Runner, each: SteadyState, name: str, value: Estimate | float, protocol: str = PROTOCOL
-) -> Measurement:
+def _row(runner: Runner, each: SteadyState, name: str, value: Estimate | float) -> Measurement:
     """The measurement of a quantity, by its name, of a settled state."""
     start, at = each.start, Conditions(case=each.case.name, start=each.start.name)
-    return measurement(runner, protocol, start.set, start.p, name, value, [each.task], **at)
+    return runner.measurement(start.set, start.p, name, value, [each.task], **at)
 
 
 PROTOCOLS = (Protocol("settled", measure), Protocol("mirrored", mirrored))

@@ -29,7 +29,7 @@ from compare.kit.brackets import Answer, Attempt, Bracket, Search, narrow
 from compare.kit.conditions import Conditions
 from compare.kit.engines import sliding_speeds
 from compare.kit.programme import Protocol
-from compare.kit.record import Measured, Measurement, Missing, Records, Sets, measurement
+from compare.kit.record import Measured, Measurement, Missing, Records, Sets
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.settling import PRESSES, SettlingCriteria, SteadyState, physical_case
 from compare.kit.statistics import (
@@ -158,11 +158,11 @@ COARSE = 1e-2
 """Relative width of a bracket where only the neighbourhood is wanted."""
 AWAY = 0.03
 """Relative distance from a known end of rolling, where an engine beside looks for it."""
-DISTANCES = (0.005, 0.01, 0.02, 0.03, 0.05)
+DISTANCES = np.array([0.005, 0.01, 0.02, 0.03, 0.05])
 """Relative distances of settled states from where something vanishes."""
-DISTANCES_BELOW_FOLD = (0.01, 0.02, 0.035, 0.05, 0.08, 0.11, 0.15)
+DISTANCES_BELOW_FOLD = np.array([0.01, 0.02, 0.035, 0.05, 0.08, 0.11, 0.15])
 """The same below a fold, in parts of the range of slipping: slip goes like the root."""
-DISTANCES_OF_NR = (0.002, 0.008, 0.02, 0.035, 0.05)
+DISTANCES_OF_NR = np.array([0.002, 0.008, 0.02, 0.035, 0.05])
 """The same from where a ball rides the wall as slowly as it can."""
 
 
@@ -266,7 +266,7 @@ class Findings:
 
     def missing(self, why: str, rows: int = 1) -> Missing:
         """A record of a threshold that was not found, and why."""
-        return Missing("thresholds", self.set, why, rows)
+        return self.runner.missing(self.set, why, rows)
 
     def row(
         self,
@@ -277,13 +277,10 @@ class Findings:
     ) -> Measurement | Missing:
         """The measurement of a threshold, or of a number; or why it wasn't found."""
         if at is None:
-            why = (
-                f"too few states settled for {quantity} by {how['by']}, or their extrapolation "
-                "has no zero"
-            )
-            return self.missing(why)
+            why = f"too few states settled for {quantity} by {how['by']}"
+            return self.missing(f"{why}, or their extrapolation has no zero")
         p = self.p.replace(omega_0=at.value) if isinstance(at, Estimate) else self.p
-        return measurement(self.runner, "thresholds", self.set, p, quantity, at, tasks, **how)
+        return self.runner.measurement(self.set, p, quantity, at, tasks, **how)
 
     def row_of_bracket(
         self, quantity: str, of: Bracket, side: str, by: str
@@ -291,9 +288,8 @@ class Findings:
         """The measurement of a threshold that lies in a bracket."""
         # Slip that is still too small to count may have begun below: it is proportional to the
         # distance.
-        speed = max(
-            slip(speeds, run) for run in of.runs[1:] if run for speeds in sliding_speeds(run)
-        )
+        _, above = of.runs
+        speed = max(slip(speeds, above) for speeds in sliding_speeds(above)) if above else 0.0
         unseen = of.width / max(1.0, speed) if quantity in ("omega_01", "omega_02") else 0.0
         return self.row(quantity, of.place.also(unseen_slip=unseen), of.tasks, side=side, by=by)
 
@@ -318,18 +314,21 @@ def _where_cases_change(runner: Runner, name: str, p: Parameters, records: Recor
         if flows := list(seen):
             ended = {Case.NR} if kind is not Passage.RR_ENDS else set(Case) - {Case.RR}
             low = max((flow for flow in flows if seen[flow] not in ended), default=flows[0] / 2)
-            changes[kind] = Bracket(
-                low, next((flow for flow in flows if flow > low), 2 * flows[-1])
-            )
+            high = next((flow for flow in flows if flow > low), 2 * flows[-1])
+            changes[kind] = Bracket(low, high)
     if any(m.set == name for m in records.select("thresholds")):
         changes = {}
         for kind, quantities in FOUND.items():
-            for known in filter(
-                None, (records.threshold(name, quantity) for quantity in quantities)
-            ):
-                away = AWAY if kind is Passage.RR_ENDS else COARSE / 3
-                changes[kind] = Bracket(known.value * (1 - away), known.value * (1 + away))
+            away = AWAY if kind is Passage.RR_ENDS else COARSE / 3
+            for known in (records.threshold(name, quantity) for quantity in quantities):
+                if known:
+                    changes[kind] = around(known.value, away)
     return Findings(runner, name, p, cases, changes)
+
+
+def around(flow: float, part: float) -> Bracket:
+    """A bracket of a flow, to either side by a part of it."""
+    return Bracket(flow * (1 - part), flow * (1 + part))
 
 
 def _narrow(
@@ -368,42 +367,32 @@ def _settle_beside(runner: Runner, found: Sequence[Findings]) -> None:
     A bracket counts only if something was seen beyond it, or that is granted."""
     beside: list[tuple[Findings, Beside, str, Array]] = []  # how they start, flows in rad s-1
     for each in found:
-        unseen = [
-            kind
-            for kind, b in each.brackets.items()
-            if not (b.runs[1] or b.high in each.cases[kind])
-        ]
-        for kind in unseen if not runner.sampling.granted else ():
-            del each.brackets[kind]
-        near, below_fold, above = (
-            np.array(row) for row in (DISTANCES, DISTANCES_BELOW_FOLD, DISTANCES_OF_NR)
-        )
+        for kind, bracket in [*each.brackets.items()]:
+            seen = bracket.runs[1] or bracket.high in each.cases[kind]
+            if not (seen or runner.sampling.granted):
+                del each.brackets[kind]
         if carried := each.brackets.get(Passage.NS_ENDS):
-            beside.append((each, Beside.NR, "on the wall", carried.high * (1 + above)))
+            beside.append((each, Beside.NR, "on the wall", carried.high * (1 + DISTANCES_OF_NR)))
             if runner.sampling.slow:  # a ball that sinks swings for long
-                beside.append((each, Beside.NS, "on the wall", carried.low * (1 - near / 2)))
+                beside.append((each, Beside.NS, "on the wall", carried.low * (1 - DISTANCES / 2)))
         end, last = each.brackets.get(Passage.RR_ENDS), each.brackets.get(Passage.SS_ENDS)
         if end and lifts(end):
-            beside.append((each, Beside.LIFTED, "on the wall", end.high * (1 + above)))
+            beside.append((each, Beside.LIFTED, "on the wall", end.high * (1 + DISTANCES_OF_NR)))
         elif end and last:
             span = last.low - end.high
-            beside.append((each, Beside.SS, "rest", end.high + near * min(span, end.high)))
-            beside.append((each, Beside.SS_LAST, "rest", last.low - below_fold * span))
+            near = end.high + DISTANCES * min(span, end.high)
+            beside.append((each, Beside.SS, "rest", near))
+            beside.append((each, Beside.SS_LAST, "rest", last.low - DISTANCES_BELOW_FOLD * span))
     starts = [
-        [
-            settling.initial_condition(each.set, each.p.replace(omega_0=flow), how)
-            for flow in flows.tolist()
-        ]
-        for each, _, how, flows in beside
+        settling.starts_at(each.set, each.p, how, flows.tolist()) for each, _, how, flows in beside
     ]
     criteria = SettlingCriteria(
         loose=runner.sampling.thresholds_loose, rounds=runner.sampling.thresholds_rounds
     )
-    for (each, which, *_), states in zip(
-        beside, settling.settle_groups(runner, starts, criteria), strict=True
-    ):
+    settled = settling.settle_groups(runner, starts, criteria)
+    for (each, which, *_), states in zip(beside, settled, strict=True):
         each.states[which] = [
-            s for s in states if not s.failure and settling.physical_case(s.case) is which.case
+            s for s in states if not s.failure and physical_case(s.case) is which.case
         ]
 
 
@@ -419,17 +408,15 @@ def _on_the_wall_and_back(each: Findings) -> Iterator[tuple[Passage, Search]]:
     end, lifted = each.brackets.get(Passage.RR_ENDS), each.states.get(Beside.LIFTED, [])
     if end and len(lifted) == len(DISTANCES_OF_NR):
         change = Bracket(end.low * (1 - COARSE), end.high * (1 + COARSE))
-        yield each.search(
-            Passage.RR_RETURNS, change, width * end.high, continued(lifted, height=0.0, less=1e-3)
-        )
+        pressed = continued(lifted, height=0.0, less=1e-3)
+        yield each.search(Passage.RR_RETURNS, change, width * end.high, pressed)
 
 
 def continued(states: Sequence[SteadyState], height: float, less: float = 0.0) -> From:
     """A state that rides the wall at a height, continued in omega_0, with less spin."""
     omegas = np.array([state.start.p.omega_0 for state in states])
-    fit = np.polynomial.Polynomial.fit(
-        omegas, [state.values["slip_x"].value for state in states], len(omegas) - 1
-    )
+    slips = [state.values["slip_x"].value for state in states]
+    fit = np.polynomial.Polynomial.fit(omegas, slips, len(omegas) - 1)
 
     def start(p: Parameters) -> Array:
         slip_x = float(fit(p.omega_0))
@@ -447,14 +434,11 @@ def _end_of_slipping(each: Findings) -> tuple[Estimate | None, bool]:
     last, held = each.states.get(Beside.SS_LAST, []), each.brackets.get(Passage.NR_BEGINS)
     top = extrapolated(last, "slip_x", extrapolated_maximum)
     unloaded = extrapolated(last, "force_Ay", extrapolated_zero)
-    off = (
-        max(abs(unloaded.value - held.high), COVERAGE * unloaded.uncertainty)
-        if held and unloaded
-        else math.inf
-    )
-    forces = partial(
-        extrapolated_maximum, others=np.array([state.values["force_Ay"].value for state in last])
-    )
+    off = math.inf
+    if held and unloaded:
+        off = max(abs(unloaded.value - held.high), COVERAGE * unloaded.uncertainty)
+    carried = np.array([state.values["force_Ay"].value for state in last])
+    forces = partial(extrapolated_maximum, others=carried)
     if pressing := extrapolated(last, "slip_x", forces):
         sure = COVERAGE * pressing.uncertainty
         return top if pressing.value > sure else None, pressing.value < -sure
@@ -472,10 +456,8 @@ def extrapolated(
     flows = [state.start.p.omega_0 for state in states]
     values = [state.values["omega_c" if quantity == "lag" else quantity] for state in states]
     if quantity == "lag":
-        values = [
-            replace(orbit, value=flow - orbit.value)
-            for flow, orbit in zip(flows, values, strict=True)
-        ]
+        both = zip(flows, values, strict=True)
+        values = [replace(orbit, value=flow - orbit.value) for flow, orbit in both]
     place = to(np.array(flows), values)
     return place if math.isfinite(place.uncertainty) else None
 
@@ -488,9 +470,9 @@ def _fold(each: Findings) -> Iterator[tuple[Passage, Search]]:
     if top and each.runner.sampling.slow:
         narrowest = each.runner.sampling.thresholds_fold
         half = max(narrowest, 5.0 * top.uncertainty / top.value)
-        change = Bracket(top.value * (1 - half), top.value * (1 + half))
         nearest, time = each.states[Beside.SS_LAST][0].mean, 1 / math.sqrt(narrowest)
-        yield each.search(Passage.FOLD, change, narrowest * top.value, lambda _: nearest, time)
+        width = narrowest * top.value
+        yield each.search(Passage.FOLD, around(top.value, half), width, lambda _: nearest, time)
 
 
 def _rows(each: Findings) -> Measured:
@@ -502,28 +484,22 @@ def _rows(each: Findings) -> Measured:
         yield each.row("lifts", 1.0, rolling.tasks)
         yield each.row_of_bracket("omega_03", rolling, "from below", "loss of the floor")
         if returns := each.bracket_seen(Passage.RR_RETURNS):
-            yield each.row_of_bracket(
-                "omega_03", returns, "from above", "return to rolling when pressed"
-            )
+            by = "return to rolling when pressed"
+            yield each.row_of_bracket("omega_03", returns, "from above", by)
         else:
-            why = (
-                "a lifted ball did not settle, and could not be pressed back to the floor: no "
-                "second omega_03"
-            )
-            yield each.missing(why)
+            why = "a lifted ball did not settle, and could not be pressed back to the floor"
+            yield each.missing(f"{why}: no second omega_03")
     else:
         yield each.row("lifts", 0.0, rolling.tasks)
         yield each.row_of_bracket("omega_01", rolling, "from below", "onset of slip")
-        yield from each.rows_of_zero(
-            Beside.SS, "lag", "omega_01", "from above", "lag of settled slipping"
-        )
+        by = "lag of settled slipping"
+        yield from each.rows_of_zero(Beside.SS, "lag", "omega_01", "from above", by)
     if begins := each.bracket_seen(Passage.NR_BEGINS):
         yield each.row_of_bracket("omega_02", begins, "from above", "onset of sliding on the wall")
     else:
         yield each.missing(f"{none} is the least to hold a ball on the wall")
-    yield from each.rows_of_zero(
-        Beside.NS, "v_y", "omega_02", "from below", "speed of settled sinking"
-    )
+    by = "speed of settled sinking"
+    yield from each.rows_of_zero(Beside.NS, "v_y", "omega_02", "from below", by)
 
 
 def _rows_of_slipping(each: Findings) -> Measured:
@@ -546,25 +522,20 @@ def _rows_of_slipping(each: Findings) -> Measured:
     if settles and (ends or not each.runner.sampling.granted):
         yield each.row("folds", float(ends - smooth), tasks)
     if smooth:
-        yield from each.rows_of_zero(
-            Beside.SS_LAST, "force_Ay", "omega_02", "from below", "floor force of settled slipping"
-        )
+        by = "floor force of settled slipping"
+        yield from each.rows_of_zero(Beside.SS_LAST, "force_Ay", "omega_02", "from below", by)
     elif top is None:
-        yield each.missing(
-            "settled slipping points to no flow at which it ends", 2 if settles else 3
-        )
+        why = "settled slipping points to no flow at which it ends"
+        yield each.missing(why, 2 if settles else 3)
     else:
-        yield each.row(
-            "omega_04", top, tasks, side="from below", by="maximum of omega_0 along the branch"
-        )
+        by = "maximum of omega_0 along the branch"
+        yield each.row("omega_04", top, tasks, side="from below", by=by)
         if fold := each.bracket_seen(Passage.FOLD):
             yield each.row_of_bracket("omega_04", fold, "from below", "last settled slipping")
         else:
             slow = "costs more than an engine beside the one on trial may"
-            why = "could not be done" if each.runner.sampling.slow else slow
-            yield each.missing(
-                f"the end of slipping at both points is extrapolated; to bracket it {why}"
-            )
+            why = "the end of slipping at both points is extrapolated; to bracket it "
+            yield each.missing(why + ("could not be done" if each.runner.sampling.slow else slow))
 
 
 PROTOCOLS = (Protocol("thresholds", measure, ("settled",)),)

@@ -35,12 +35,11 @@ from compare.kit.record import (
     Records,
     Sets,
     if_found,
-    measurement,
 )
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.settling import rounded_duration, settle
 from compare.kit.statistics import COVERAGE, Estimate, estimate, peaks, top, uniform
-from compare.kit.step_pairs import Start, StepPair, carry_out, of_no_step
+from compare.kit.step_pairs import Start, StepPair, carry_out, constrained, of_no_step
 from compare.kit.tasks import Task
 from model import Case, Contact, Flow, Parameters, State, Trajectory
 from model.arrays import Array
@@ -82,46 +81,43 @@ def pulsation(runner: Runner, sets: Sets, records: Records) -> Measured:
     for name, p in sets.items():
         if (rolls := records.threshold(name, "omega_01")) is None:
             why = "no flow was measured at which two-point rolling ends by slipping"
-            yield Missing("pulsation", name, why)
+            yield runner.missing(name, why)
             continue
         q = p.replace(omega_0=ROLLS_AT * rolls.value)
         room, lowest = rolls.value - q.omega_0, _lowest(p)
         octaves, reach = runner.sampling.pulsation_octaves, runner.sampling.pulsation_reach * room
-        small += [Pulsation(name, q, lowest * 2.0**n, 0.5 * room, reach) for n in octaves]
+        small += [Pulsation(runner, name, q, lowest * 2.0**n, 0.5 * room, reach) for n in octaves]
     followed = _as_followed(runner, small)
     for each in followed:
         if each.failure:
-            yield Missing("pulsation", each.set, f"at {each.frequency:g} Hz {each.failure}")
+            yield runner.missing(each.set, f"at {each.frequency:g} Hz {each.failure}")
             continue
         gain, lag, sure = abs(each.ratio), -cmath.phase(each.ratio), each.uncertainty
-        for quantity, value in (
-            ("gain", estimate(gain, time_step=sure)),
-            ("phase_lag", estimate(lag, time_step=sure / gain)),
-        ):
-            yield each.row(runner, quantity, value, each.tasks, amplitude=each.amplitude)
+        size = Conditions(amplitude=each.amplitude)
+        yield each.row("gain", estimate(gain, time_step=sure), each.tasks, **size)
+        yield each.row("phase_lag", estimate(lag, time_step=sure / gain), each.tasks, **size)
     rolling, slipping = _raised(runner, [each for each in followed if not each.failure]), []
-    for each, bracket in zip(
-        rolling, narrow(runner, [_search(runner, each) for each in rolling]), strict=True
-    ):
-        onset = _onset(runner, each, bracket)
+    brackets = narrow(runner, [each.search() for each in rolling])
+    for each, bracket in zip(rolling, brackets, strict=True):
+        onset = each.onset(bracket)
         yield onset
         if isinstance(onset, Missing):
             continue
         # The predicted amplitude may be a tenth smaller than the measured one.
-        if (
-            COVERAGE * onset.uncertainty
-            <= QUANTITIES["slip_amplitude"].resolution * 0.9 * onset.value
-        ):
+        least = QUANTITIES["slip_amplitude"].resolution * 0.9 * onset.value
+        if COVERAGE * onset.uncertainty <= least:
             slipping.append((each, 1.5 * onset.value))
         else:
             at = f"a pulsation at {each.frequency:g} Hz"
             why = f"slip in {at} begins at no definite amplitude: no mean reading there"
-            yield Missing("pulsation", each.set, why)
-    strong = [each for name, p in sets.items() for each in _strong(name, p, records)]
+            yield runner.missing(each.set, why)
+    strong = [each for name, p in sets.items() for each in _strong(runner, name, p, records)]
     yield from mean_errors(runner, slipping + strong)
 
 
-def _strong(name: str, p: Parameters, records: Records) -> Iterator[tuple[Pulsation, float]]:
+def _strong(
+    runner: Runner, name: str, p: Parameters, records: Records
+) -> Iterator[tuple[Pulsation, float]]:
     """Pulsations by several times the mean flow, under Stokes' law, and amplitudes."""
     end = records.threshold(name, "omega_01")
     if end and p.drag == STOKES:
@@ -129,7 +125,7 @@ def _strong(name: str, p: Parameters, records: Records) -> Iterator[tuple[Pulsat
         for share, times in STRONG:
             q = p.replace(omega_0=share * end.value)
             amplitude = times * q.omega_0
-            yield Pulsation(name, q, frequency, amplitude, amplitude), amplitude
+            yield Pulsation(runner, name, q, frequency, amplitude, amplitude), amplitude
 
 
 def _lowest(p: Parameters) -> float:
@@ -150,6 +146,7 @@ class Timing(NamedTuple):
 class Pulsation:
     """A pulsating flow, and how a rolling ball follows it."""
 
+    runner: Runner
     set: str
     p: Parameters  # with the mean flow
     frequency: float
@@ -171,46 +168,58 @@ class Pulsation:
         """The pulsation with a ball whose omega_c is this as a period begins, rad s-1."""
         return replace(self, lead=(omega_c - self.p.omega_0) / self.amplitude)
 
-    def task(
-        self, runner: Runner, amplitude: float, x: Array, timing: Timing, largest: float = 0.0
-    ) -> Task:
+    def task(self, amplitude: float, x: Array, timing: Timing, largest: float = 0.0) -> Task:
         """A run from a state; steps in a period, a power of two, suit the `largest` amplitude."""
+        runner = self.runner
         fastest = 4 * (self.p.omega_0 + max(amplitude, largest)) / self.frequency
         least = max(
             runner.sampling.pulsation_steps, 1 / (self.frequency * coarse_step(self.p)), fastest
         )
         step = 1 / (self.frequency * 2 ** math.ceil(math.log2(least)) * timing.divisor)
         flow = Flow.sine(self.p.omega_0, amplitude, self.frequency, timing.phase)
-        samples = round(timing.samples * timing.periods)
-        return runner.task(
-            self.p, x, timing.periods / self.frequency, step, flow=flow, samples=samples
-        )
+        samples, t_end = round(timing.samples * timing.periods), timing.periods / self.frequency
+        return runner.task(self.p, x, t_end, step, flow=flow, samples=samples)
+
+    def search(self) -> Search:
+        """A search for the amplitude at which slip begins, in runs of a period and a half."""
+        sampling = self.runner.sampling
+        if self.p.drag == STOKES:
+            # Slip may begin from about half the largest amplitude on: the width is taken relative
+            # to that.
+            largest = self.reach / abs(self.ratio)
+            around, size = Bracket(0.0, largest), largest / 2
+        else:
+            around = Bracket(0.99 * self.amplitude, RAISED * self.amplitude)
+            size = self.amplitude
+
+        def task(amplitude: float, bracket: Bracket, attempt: Attempt) -> Task:
+            timing = Timing(1.5 * attempt.time, sampling.pulsation_samples, 2 * attempt.divisor)
+            return self.task(amplitude, self.start(amplitude), timing, largest=around.high)
+
+        return Search(around, task, rolls_on, sampling.pulsation_width * size)
+
+    def onset(self, bracket: Bracket) -> Measurement | Missing:
+        """The measurement of the amplitude at which slip begins."""
+        at, place = f"a pulsation at {self.frequency:g} Hz", bracket.place
+        low, high = bracket.runs
+        if low is None or high is None:
+            why = f"in {at} there is slip at no amplitude, or at all"
+            return self.runner.missing(self.set, why)
+        alone = np.abs(low.slip_speed_A - low.slip_speed_B)[low.time > low.time[-1] / 6].max()
+        if alone > 2e-4 * math.sqrt(self.p.g * self.p.R):
+            why = f"in {at} one contact slips before both do, too little to tell when"
+            return self.runner.missing(self.set, why)
+        # Near the phase at which it sets in, slip lasts for 2 sqrt(2 e) rad beyond the onset by e.
+        samples = self.runner.sampling.pulsation_samples
+        unseen = (math.pi * LASTING / samples) ** 2 / 2 * place.value
+        return self.row("slip_amplitude", place.also(unseen_slip=unseen), bracket.tasks)
 
     def row(
-        self,
-        runner: Runner,
-        quantity: str,
-        value: Estimate,
-        tasks: Sequence[Task],
-        **at: Unpack[Conditions],
+        self, quantity: str, value: Estimate, tasks: Sequence[Task], **at: Unpack[Conditions]
     ) -> Measurement:
         """A measurement in this pulsation."""
         at = Conditions(f=self.frequency) | at
-        return measurement(runner, "pulsation", self.set, self.p, quantity, value, tasks, **at)
-
-
-def _onset(runner: Runner, each: Pulsation, bracket: Bracket) -> Measurement | Missing:
-    """The measurement of the amplitude at which slip begins."""
-    at, place, (low, high) = f"a pulsation at {each.frequency:g} Hz", bracket.place, bracket.runs
-    if low is None or high is None:
-        return Missing("pulsation", each.set, f"in {at} there is slip at no amplitude, or at all")
-    alone = np.abs(low.slip_speed_A - low.slip_speed_B)[low.time > low.time[-1] / 6].max()
-    if alone > 2e-4 * math.sqrt(each.p.g * each.p.R):
-        why = f"in {at} one contact slips before both do, too little to tell when"
-        return Missing("pulsation", each.set, why)
-    # Near the phase at which it sets in, slip lasts for 2 sqrt(2 e) rad beyond the onset by e.
-    unseen = (math.pi * LASTING / runner.sampling.pulsation_samples) ** 2 / 2 * place.value
-    return each.row(runner, "slip_amplitude", place.also(unseen_slip=unseen), bracket.tasks)
+        return self.runner.measurement(self.set, self.p, quantity, value, tasks, **at)
 
 
 class Round(NamedTuple):
@@ -233,14 +242,12 @@ def _settled_rounds(
     states = [each.start(a) for each, a in driven]
     seen = list[list[Round] | str]([[]] * len(driven))
     for n in range(ROUNDS):
-        last = n == ROUNDS - 1
-        timing = Timing(
-            PERIODS, samples, divisor * (runner.sampling.pulsation_divisor if last else 1)
-        )
+        finer = runner.sampling.pulsation_divisor if n == ROUNDS - 1 else 1
+        timing = Timing(PERIODS, samples, divisor * finer)
         todo = [
             (k, *driven[k], before) for k, before in enumerate(seen) if not isinstance(before, str)
         ]
-        tasks = [each.task(runner, a, states[k], timing) for k, each, a, _ in todo]
+        tasks = [each.task(a, states[k], timing) for k, each, a, _ in todo]
         for (k, each, a, before), task, run in zip(todo, tasks, runner.each(tasks), strict=True):
             if isinstance(run, str):
                 seen[k] = f"the run {run}"
@@ -259,31 +266,25 @@ def _settled_rounds(
 def _as_followed(runner: Runner, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
     """Pulsations with omega_c at the beginning of a period as runs show it."""
     followed, samples = [], runner.sampling.pulsation_samples
-    last = slice(-2 * samples, None)
-    rounds = _settled_rounds(
-        runner, [(each, each.amplitude) for each in pulsations], 2, samples, slips=False
-    )
+    last, driven = slice(-2 * samples, None), [(each, each.amplitude) for each in pulsations]
+    rounds = _settled_rounds(runner, driven, 2, samples, slips=False)
     for each, seen in zip(pulsations, rounds, strict=True):
         if isinstance(seen, str):
             followed.append(replace(each, failure=seen))
             continue
         first, ratio = (
-            complex(
-                2j
-                * np.mean(x[last] * np.exp(-2j * math.pi * each.frequency * t[last]))
-                / each.amplitude
-            )
-            for t, x in ((run.time, run.omega_c) for _, run, _ in seen)
+            complex(2j * np.mean(x * np.exp(-2j * math.pi * each.frequency * t)) / each.amplitude)
+            for t, x in ((run.time[last], run.omega_c[last]) for _, run, _ in seen)
         )
-        failure = (
-            ""
-            if rolls_on(seen[-1].run)
-            else "a ball slips in a pulsation half as large as in a slow one"
+        slips = "a ball slips in a pulsation half as large as in a slow one"
+        new = replace(
+            each.with_omega_c(seen[-1].omega_c),
+            ratio=ratio,
+            uncertainty=abs(ratio - first),
+            failure="" if rolls_on(seen[-1].run) else slips,
+            tasks=tuple(task for task, *_ in seen),
         )
-        new = each.with_omega_c(seen[-1].omega_c)
-        change = abs(ratio - first)
-        tasks = tuple(task for task, *_ in seen)
-        followed.append(replace(new, ratio=ratio, uncertainty=change, failure=failure, tasks=tasks))
+        followed.append(new)
     return followed
 
 
@@ -296,41 +297,18 @@ def _raised(runner: Runner, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
             replace(each, amplitude=RAISED * each.amplitude, lead=each.lead * RAISED**each.power)
             for each in (raised[k] for k in todo)
         ]
-        still = [
-            (k, each)
-            for k, each in zip(todo, _as_followed(runner, higher), strict=True)
-            if not each.failure
-        ]
-        for k, each in still:
+        followed = zip(todo, _as_followed(runner, higher), strict=True)
+        still = {k: each for k, each in followed if not each.failure}
+        for k, each in still.items():
             raised[k] = replace(each, power=math.log(each.lead / raised[k].lead, RAISED))
-        todo = [k for k, _ in still]
+        todo = list(still)
     return raised
-
-
-def _search(runner: Runner, each: Pulsation) -> Search:
-    """A search for the amplitude at which slip begins, in runs of a period and a half."""
-
-    def task(amplitude: float, bracket: Bracket, attempt: Attempt) -> Task:
-        timing = Timing(1.5 * attempt.time, runner.sampling.pulsation_samples, 2 * attempt.divisor)
-        return each.task(runner, amplitude, each.start(amplitude), timing, largest=first.high)
-
-    if each.p.drag == STOKES:
-        # Slip may begin from about half the largest amplitude on: the width is taken relative to
-        # that.
-        largest = each.reach / abs(each.ratio)
-        first, size = Bracket(0.0, largest), largest / 2
-    else:
-        first = Bracket(0.99 * each.amplitude, RAISED * each.amplitude)
-        size = each.amplitude
-    return Search(first, task, rolls_on, runner.sampling.pulsation_width * size)
 
 
 def rolls_on(run: Trajectory) -> bool:
     """Whether after a sixth slip at both points, or flight, never lasts: `LASTING`."""
-    gone = np.isin(
-        run.case[run.time > run.time[-1] / 6],
-        [Case.SS, *(case for case in Case if case.A is Contact.N)],
-    )
+    cases = [Case.SS, *(case for case in Case if case.A is Contact.N)]
+    gone = np.isin(run.case[run.time > run.time[-1] / 6], cases)
     return bool(np.convolve(gone, np.ones(LASTING)).max() < LASTING)
 
 
@@ -340,22 +318,22 @@ def mean_errors(runner: Runner, slipping: Sequence[tuple[Pulsation, float]]) -> 
     The engine may remember what a state doesn't hold, such as how strongly floor and wall press
     against each other. How much the mean depends on it is seen in periods that start anew from
     states of the last one."""
-
-    phases = PHASES
-    samples = 8 * phases
+    samples = 8 * PHASES
     rounds = _settled_rounds(runner, slipping, 1, samples, slips=True)
     anew = [
-        each.task(runner, a, x, Timing(1, samples, 1, phase=2 * math.pi * k / phases))
+        [
+            each.task(a, x, Timing(1, samples, 1, phase=2 * math.pi * k / PHASES))
+            for k, x in enumerate(seen[0].run.x[-1 - samples : -1 : samples // PHASES])
+        ]
         for (each, a), seen in zip(slipping, rounds, strict=True)
         if not isinstance(seen, str)
-        for k, x in enumerate(seen[0].run.x[-1 - samples : -1 : samples // phases])
     ]
-    begun = runner.groups([anew[k : k + phases] for k in range(0, len(anew), phases)])
+    begun = runner.groups(anew)
     for (each, amplitude), seen in zip(slipping, rounds, strict=True):
         at = f"the mean reading at {each.frequency:g} Hz"
         if isinstance(seen, str) or isinstance(again := next(begun), str):
             why = f"{at}: {seen if isinstance(seen, str) else f'the run {again}'}"
-            yield Missing("pulsation", each.set, why)
+            yield runner.missing(each.set, why)
             continue
         (_, run, _), (task, halved, _) = seen
         turns = np.array([period.theta[-1] - period.theta[0] for period in again])
@@ -369,7 +347,7 @@ def mean_errors(runner: Runner, slipping: Sequence[tuple[Pulsation, float]]) -> 
         within = abs(value) / round(task.steps / PERIODS) if task.settings.timestep else 0.0
         error = estimate(value, drift_and_time_step=drift + within)
         slips = _slips(halved.case[-samples:])
-        row = each.row(runner, "mean_error", error, [task], amplitude=amplitude, slips=slips)
+        row = each.row("mean_error", error, [task], amplitude=amplitude, slips=slips)
         yield if_found(row, f"{at} is none")
 
 
@@ -394,7 +372,7 @@ def jumps(runner: Runner, sets: Sets, records: Records) -> Measured:
         slips, carries, folds = (records.threshold(name, f"omega_0{n}") for n in (1, 2, 4))
         if slips is None or carries is None:
             why = "no flows were measured between which the ball slips at both points"
-            yield Missing("unsteady", name, why)
+            yield runner.missing(name, why)
             continue
         begins, holds, ends = slips.value, carries.value, folds.value if folds else math.nan
         flows[name] = begins, holds, ends
@@ -406,41 +384,36 @@ def jumps(runner: Runner, sets: Sets, records: Records) -> Measured:
         starts.append(Start(name, q, "jump", np.zeros(8)))
         if folds is None:
             why = "no flow was measured at which slipping at both points ends in a jump"
-            yield Missing("unsteady", name, why)
+            yield runner.missing(name, why)
         else:
             q = p.replace(omega_0=begins + RAMP[0] * (ends - begins))
             starts.append(Start(name, q, "ramp", np.zeros(8)))
     for start, state in zip(starts, settle(runner, starts), strict=True):
         if state.failure or state.case is not Case.SS:
             why = state.failure or state.case.name
-            yield Missing("unsteady", start.set, f"no settled slipping to start from: {why}")
+            yield runner.missing(start.set, f"no settled slipping to start from: {why}")
             continue
         begins, holds, ends = flows[start.set]
         # At both walls to the last digit.
-        begun = replace(
-            start, x0=State.of(state.mean)._replace(y=0.0, v_y=0.0, h=0.0, v_h=0.0).stacked()
-        )
+        begun = replace(start, x0=constrained(Case.SS, state.mean, start.p))
         if start.name == "jump":
             pairs.append(_jump(runner, replace(begun, name="SS"), JUMP / 3 * (holds - begins)))
         else:
             pairs += _ramps(runner, begun, begins, ends)
-    for result in carry_out(runner, "unsteady", pairs):
+    for result in carry_out(runner, pairs):
         if isinstance(result, Missing):
             yield result
             continue
         pair, coarse, fine = result.pair, result.coarse, result.fine
         if pair.flow is None:
             for quantity in ("jump_delay",) if pair.name == "RR" else ("jump_peak", "jump_height"):
-                row = result.row(
-                    runner, quantity, of_no_step(coarse[quantity].value, fine[quantity])
-                )
+                row = result.row(quantity, of_no_step(coarse[quantity].value, fine[quantity]))
                 yield if_found(row, f"{quantity} in {pair.name}: no peak")
         elif math.isfinite(coarse) and math.isfinite(fine):
-            yield result.row(runner, "ramp_end", of_no_step(coarse, estimate(fine)))
+            yield result.row("ramp_end", of_no_step(coarse, estimate(fine)))
         else:
-            rise = f"{pair.at['rate']:.3g} rad/s^2"
-            why = f"a ramp of {rise} doesn't end slipping at both points"
-            yield Missing("unsteady", pair.set, why)
+            ramp = f"a ramp of {pair.at['rate']:.3g} rad/s^2"
+            yield result.missing(f"{ramp} doesn't end slipping at both points")
 
 
 def _jump(runner: Runner, start: Start, size: float) -> StepPair:
@@ -449,20 +422,9 @@ def _jump(runner: Runner, start: Start, size: float) -> StepPair:
     sides = tuple(p.replace(omega_0=p.omega_0 + side * size) for side in (1, -1))
     # drag may be weak, and peaks come soon
     samples = max(4000, round(t_end / (4 * coarse_step(p))))
-    divisors, at = runner.sampling.unsteady_divisors, Conditions(case=start.name)
-    return StepPair(
-        start.set,
-        p,
-        start.name,
-        start.x0,
-        t_end,
-        divisors,
-        samples,
-        _jump_quantities,
-        None,
-        sides,
-        at,
-    )
+    divisors, read = runner.sampling.unsteady_divisors, _jump_quantities
+    both = StepPair(start.set, p, start.name, start.x0, t_end, divisors, samples, read)
+    return replace(both, variants=sides, at=Conditions(case=start.name))
 
 
 def _ramps(runner: Runner, start: Start, begins: float, ends: float) -> Iterator[StepPair]:
@@ -473,9 +435,8 @@ def _ramps(runner: Runner, start: Start, begins: float, ends: float) -> Iterator
         rise = rate * p.c * span
         t_end, at = (last - p.omega_0) / rise, Conditions(rate=rise) | state_of(start.x0[:6])
         flow, divisors = Flow.ramp(p.omega_0, last, t_end), runner.sampling.unsteady_ramps
-        yield StepPair(
-            start.set, p, "ramp", start.x0, t_end, divisors, 16000, caught_up, flow, (), at
-        )
+        ramp = StepPair(start.set, p, "ramp", start.x0, t_end, divisors, 16000, caught_up, flow)
+        yield replace(ramp, at=at)
 
 
 def odd_part(up: Trajectory, down: Trajectory) -> Array:
