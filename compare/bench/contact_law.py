@@ -71,10 +71,8 @@ class Contacts:
     def cone(self) -> Array:
         """Share of the friction cone, or pyramid, in use."""
         used = np.abs(self.force[:, 1:]) / self.friction * self._frictional
-        share: Array = (used.sum(1) if self.pyramidal else np.hypot.reduce(used, 1)) / self.force[
-            :, 0
-        ]
-        return share
+        share: Array = used.sum(1) if self.pyramidal else np.hypot.reduce(used, 1)
+        return share / self.force[:, 0]
 
     def lacking(self, slides: Array) -> float:
         """Share of Coulomb's friction that the pyramid lacks in all contacts; `slides` says which
@@ -102,12 +100,11 @@ class Contacts:
     @property
     def softness(self) -> Array:
         """R d/(1 - d): the inverse mass that scales the softness of rows or edges, 1/kg."""
+        if not self.pyramidal:
+            return self.inverse_mass
         mu2 = self.friction[:, 0] ** 2
-        edges = (
-            np.where(self.dim > 1, 2 * mu2 * (1 + mu2) / self.impratio, 1) if self.pyramidal else 1
-        )
-        found: Array = self.inverse_mass * edges
-        return found
+        edges = np.where(self.dim > 1, 2 * mu2 * (1 + mu2) / self.impratio, 1)
+        return np.asarray(self.inverse_mass * edges)
 
     @np.errstate(all="ignore")  # what is not chosen divides by zero
     def reference(self, solref: Array) -> tuple[Array, Array]:
@@ -115,9 +112,8 @@ class Contacts:
         high = np.clip(self.solimp[:, 1], mujoco.mjMINIMP, mujoco.mjMAXIMP)
         time, ratio = np.where(((solref > 0).sum(1) == 1)[:, None], SOLREF, solref).T
         if self.refsafe and self.discrete:
-            shortest = np.where(
-                time * ratio < self.timestep, self.timestep / (np.sqrt(high) * ratio), time
-            )
+            least = self.timestep / (np.sqrt(high) * ratio)
+            shortest = np.where(time * ratio < self.timestep, least, time)
             time = np.where(time > 0, shortest, time)
         elif self.refsafe:
             time = np.where(time > 0, np.maximum(time, 2 * self.timestep), time)
@@ -149,11 +145,9 @@ class Contacts:
         softness, k = (1 - d) / d * self.softness, spring * d
         if not self.discrete:
             return softness, k, b_f
-        return (
-            softness,
-            k,
-            b + k * h if self.pyramidal else b_f * (1 + b * h + k * h**2) / (1 + b_f * h),
-        )
+        if self.pyramidal:
+            return softness, k, b + k * h
+        return softness, k, b_f * (1 + b * h + k * h**2) / (1 + b_f * h)
 
     def _depth(self, slides: Array) -> Array:
         """Depth below the margin at which contacts bear their loads, by bisection, m."""
@@ -164,14 +158,8 @@ class Contacts:
         for _ in range(100):
             middle = (low + high) / 2
             softness, k, damping = self._rows(middle)
-            x = k * middle / softness
-            sliding = (
-                damping[:, None]
-                * self.friction
-                * np.abs(self.slip)
-                / softness[:, None]
-                * self._frictional
-            )
+            x, damped = k * middle / softness, damping[:, None] * self.friction * np.abs(self.slip)
+            sliding = damped / softness[:, None] * self._frictional
             if self.pyramidal:
                 edge = np.where(slides[:, None], x[:, None] + sliding, self._scaled_friction)
                 edges = (np.maximum(2 * x[:, None], edge) * self._frictional).sum(1)
@@ -193,42 +181,27 @@ class Contacts:
         softness, k, damping = self._rows(depth)
         first, _, first_damping = self._rows(np.zeros(len(load)))
         if self.pyramidal:
-            x = (k * depth / softness)[:, None]
-            wanted = self._scaled_friction
-            creep = (
-                softness[:, None]
-                * np.where(wanted <= 2 * x, wanted / 2, wanted - x)
-                / (mu * damping[:, None])
-            )
+            x, wanted = (k * depth / softness)[:, None], self._scaled_friction
+            pushed = np.where(wanted <= 2 * x, wanted / 2, wanted - x)
+            creep = softness[:, None] * pushed / (mu * damping[:, None])
             hover = first * load / (first_damping * np.hypot(mu[:, 0], mu[:, 1]))
             sideways = 2 * mu**2 / softness[:, None]
         else:
             soft = softness[:, None] / self.impratio * (mu[:, :1] / mu) ** 2
             creep = soft * np.abs(self.force[:, 1:]) / damping[:, None]
-            hover = (
-                (1 + mu[:, 0] ** 2 / self.impratio)
-                * first
-                * load
-                / (mu[:, :2].max(1) * first_damping)
-            )
+            apart = (1 + mu[:, 0] ** 2 / self.impratio) * first * load
+            hover = apart / (mu[:, :2].max(1) * first_damping)
             sideways = 1 / soft
         shift = 1e-6 * depth
-        (softer, k_less, _), (harder, k_more, _) = (
-            self._rows(depth - shift),
-            self._rows(depth + shift),
-        )
-        slope = (
-            softness
-            * (k_more * (depth + shift) / harder - k_less * (depth - shift) / softer)
-            / (2 * shift)
-        )
+        low, high = depth - shift, depth + shift
+        (softer, k_less, _), (harder, k_more, _) = self._rows(low), self._rows(high)
+        slope = softness * (k_more * high / harder - k_less * low / softer) / (2 * shift)
         # it corrects friction alone, after normal forces were found beside friction at no creep
         if self.noslip:
             creep, sticks = np.zeros_like(creep), frictional & ~slides[:, None]
             along, soft = self.rows[:, 1:][sticks], 1 / sideways[sticks]
-            lacking = np.linalg.solve(
-                along @ along.T + np.diag(soft), soft * self.force[:, 1:][sticks]
-            )
+            seen, asked = along @ along.T + np.diag(soft), soft * self.force[:, 1:][sticks]
+            lacking = np.linalg.solve(seen, asked)
             depth = depth - self.rows[:, 0] @ (along.T @ lacking) / k
         creep = np.where(frictional, creep, 0)
         # one row, or all edges of a pyramid
@@ -262,11 +235,8 @@ class Contacts:
         """Mass, damping and stiffness (n, n) of small motions: m a + d v + k x = 0."""
         law, flat = self.law(), self.rows.reshape(6 * len(self.dim), self.rows.shape[2])
         weight = law.weight * (np.arange(6) < self.dim[:, None])
-
         values = weight, weight * law.damping, weight * law.stiffness[:, None] * (np.arange(6) == 0)
-        mass, damping, stiffness = (
-            (flat.T * np.nan_to_num(each).ravel()) @ flat for each in values
-        )
+        mass, damping, stiffness = ((flat.T * np.nan_to_num(v).ravel()) @ flat for v in values)
         return np.eye(len(mass)) + mass, damping, stiffness
 
     def stable(self, timestep: float) -> bool:
@@ -320,9 +290,8 @@ def contacts(model: Any, data: Any) -> tuple[Contacts, Array]:
     mujoco.mj_forward(twin, state)
     mujoco.mj_forward(model, data)
     found, mass = data.contact, np.zeros((model.nv, model.nv))
-    number = np.flatnonzero(
-        (state.contact.efc_address >= 0) & (found.exclude == 0) & (found.geom >= 0).all(1)
-    )
+    there = (state.contact.efc_address >= 0) & (found.exclude == 0)
+    number = np.flatnonzero(there & (found.geom >= 0).all(1))
     force = np.zeros((len(number), 6))
     for k, each in enumerate(number):
         mujoco.mj_contactForce(model, data, each, force[k])
@@ -340,10 +309,8 @@ def contacts(model: Any, data: Any) -> tuple[Contacts, Array]:
     rows = np.zeros((len(number), 6, model.nv))
     if len(number):
         mujoco.mj_fullM(model, data, mass)
-        start = np.append(state.efc_J_rowadr, state.nJ)
-        jacobian = scipy.sparse.csr_array(
-            (state.efc_J, state.efc_J_colind, start), (state.nefc, model.nv)
-        ).toarray()
+        sparse = state.efc_J, state.efc_J_colind, np.append(state.efc_J_rowadr, state.nJ)
+        jacobian = scipy.sparse.csr_array(sparse, (state.nefc, model.nv)).toarray()
         whitened = scipy.linalg.solve_triangular(np.linalg.cholesky(mass), jacobian.T, lower=True).T
         rows = whitened[row] * there[..., None]
     described = Contacts(
@@ -361,7 +328,7 @@ def contacts(model: Any, data: Any) -> tuple[Contacts, Array]:
 
 def parameters(model: Any, data: Any, number: Array) -> dict[str, Any]:
     """What options of a model decide for these contacts, by the names in `Contacts`."""
-    option = model.opt
+    option, own = model.opt, ("solref", "solreffriction", "solimp", "friction")
     return {
         "timestep": option.timestep,
         "impratio": option.impratio,
@@ -369,52 +336,39 @@ def parameters(model: Any, data: Any, number: Array) -> dict[str, Any]:
         "integrator": option.integrator,
         "noslip": option.noslip_iterations > 0,
         "refsafe": not option.disableflags & mujoco.mjtDisableBit.mjDSBL_REFSAFE,
-        **{
-            name: getattr(data.contact, name)[number]
-            for name in ("solref", "solreffriction", "solimp", "friction")
-        },
-    }
+    } | {name: getattr(data.contact, name)[number] for name in own}
 
 
 def replacements(model: Any, c: Contacts, names: Sequence[str]) -> Iterator[tuple[str, str]]:
     """Parameters of a pair in whose place the engine takes others: the kind, and how."""
     asked, imp, limits = c.solref[0], c.solimp[0], (mujoco.mjMINIMP, mujoco.mjMAXIMP)
     if (asked > 0).sum() == 1:
-        yield (
-            "solref of neither format",
-            f"{asked[0]:g} {asked[1]:g}: {SOLREF[0]:g} {SOLREF[1]:g} is taken",
-        )
+        how = f"{asked[0]:g} {asked[1]:g}: {SOLREF[0]:g} {SOLREF[1]:g} is taken"
+        yield "solref of neither format", how
     for name in ("solref", "solreffriction"):
         ref = getattr(c, name)
         if (ref[0] > 0).all():
             taken = 2 / (c.reference(ref)[1][0] * np.clip(imp[1], *limits))
             if taken > 1.000001 * ref[0, 0]:
-                yield (
-                    f"{name} too short for the time step",
-                    f"{ref[0, 0]:g} s: {taken:.3g} s is taken (refsafe)",
-                )
+                how = f"{ref[0, 0]:g} s: {taken:.3g} s is taken (refsafe)"
+                yield f"{name} too short for the time step", how
     if c.solreffriction.any() and c.pyramidal:
         yield "solreffriction", "the pyramidal cone ignores it"
     if (clipped := np.clip(imp[:2], *limits) != imp[:2]).any():
-        yield (
-            "impedance out of range",
-            f"{imp[:2][clipped][0]:g}: the limit is taken, {limits[0]:g} or {limits[1]:g}",
-        )
-    if (
-        (np.sort(c.geoms[0]) == np.sort(np.column_stack([model.pair_geom1, model.pair_geom2])))
-        .all(1)
-        .any()
-    ):
+        how = f"{imp[:2][clipped][0]:g}: the limit is taken, {limits[0]:g} or {limits[1]:g}"
+        yield "impedance out of range", how
+    pairs = np.sort(np.column_stack([model.pair_geom1, model.pair_geom2]))
+    if (np.sort(c.geoms[0]) == pairs).all(1).any():
         return  # parameters of the geoms count for nothing
     for name, mixed in (("solref", asked), ("solimp", imp), ("friction", c.friction[0, [0, 2, 3]])):
         own = getattr(model, f"geom_{name}")[c.geoms[0]]
         if not np.allclose(own[0], own[1]):
             first, second, taken = (" ".join(f"{v:g}" for v in each) for each in (*own, mixed))
-            said = (
-                f"{first} ({names[c.geoms[0, 0]]}) and {second} ({names[c.geoms[0, 1]]}): "
-                f"{taken} is taken"
+            one, other = (names[geom] for geom in c.geoms[0])
+            yield (
+                f"{name} of two geoms",
+                f"{first} ({one}) and {second} ({other}): {taken} is taken",
             )
-            yield f"{name} of two geoms", said
 
 
 def geom_names(model: Any) -> list[str]:

@@ -64,10 +64,8 @@ def load(path: Path, keyframe: str | None = None) -> tuple[Any, Any]:
     Raises `StorageError` if there is no such file, `InputError` if MuJoCo refuses it, it is huge,
     it has no such keyframe, or its time step is no positive number."""
     if not path.is_file():
-        raise StorageError(
-            f"cannot read {path}: "
-            f"{'it is a directory' if path.is_dir() else 'there is no such file'}"
-        )
+        why = "it is a directory" if path.is_dir() else "there is no such file"
+        raise StorageError(f"cannot read {path}: {why}")
     try:  # MuJoCo takes a name as UTF-8, also where Python's file system has another encoding
         name = os.fsencode(path).decode("utf-8")
     except UnicodeDecodeError as error:
@@ -89,9 +87,8 @@ def load(path: Path, keyframe: str | None = None) -> tuple[Any, Any]:
         if keyframe not in names and keyframe not in map(str, range(model.nkey)):
             others = f", but {few(names)}" if names else ""
             raise InputError(f"{path} has no keyframe {keyframe!r}{others}")
-        mujoco.mj_resetDataKeyframe(
-            model, data, names.index(keyframe) if keyframe in names else int(keyframe)
-        )
+        number = names.index(keyframe) if keyframe in names else int(keyframe)
+        mujoco.mj_resetDataKeyframe(model, data, number)
     return model, data
 
 
@@ -133,10 +130,7 @@ def set_controls(model: Any, data: Any, values: Sequence[str]) -> None:
 
     Raises `InputError` for a name or a number that the model does not allow."""
     names = [model.actuator(k).name or str(k) for k in range(model.nu)]
-    given = [
-        (name, text) if equals else ("", name)
-        for name, equals, text in (v.rpartition("=") for v in values)
-    ]
+    given = [(name, text) for name, _, text in (value.rpartition("=") for value in values)]
     if not all(name for name, _ in given):
         if any(name for name, _ in given) or len(given) != model.nu:
             raise InputError(
@@ -145,13 +139,11 @@ def set_controls(model: Any, data: Any, values: Sequence[str]) -> None:
         given = list(zip(names, values, strict=True))
     for name, text in given:
         if name not in names:
-            raise InputError(
-                f"--ctrl: there is no actuator {name!r}, but {few(names) or 'none at all'}"
-            )
+            others = few(names) or "none at all"
+            raise InputError(f"--ctrl: there is no actuator {name!r}, but {others}")
         k = names.index(name)
-        allowed = (
-            Range(*model.actuator_ctrlrange[k].tolist()) if model.actuator_ctrllimited[k] else ANY
-        )
+        limited, limits = model.actuator_ctrllimited[k], model.actuator_ctrlrange[k].tolist()
+        allowed = Range(*limits) if limited else ANY
         data.ctrl[k] = parse_number(f"--ctrl: {name}", text, "1", allowed)
 
 
@@ -222,10 +214,8 @@ def settle(
     if sleepy is not model:  # what it puts to sleep at once if it may
         state = copy.copy(data)
         step(sleepy, state, 2 * mujoco.mjMINAWAKE)
-        trees = np.flatnonzero(state.tree_asleep >= 0)
-        asleep = [
-            _body_name(model, int(np.flatnonzero(model.body_treeid == tree)[0])) for tree in trees
-        ]
+        for tree in np.flatnonzero(state.tree_asleep >= 0):
+            asleep.append(_body_name(model, np.flatnonzero(model.body_treeid == tree)[0]))
     return Rest(steady, moving, tuple(_collapsed(model, first, data)), tuple(asleep))
 
 
@@ -243,20 +233,14 @@ def _collapsed(model: Any, first: Any, data: Any) -> Iterator[str]:
     turned, gravity = np.zeros(model.nv), np.array(model.opt.gravity)
     mujoco.mj_differentiatePos(model, turned, 1, first.qpos, data.qpos)
     hinges = model.jnt_type[model.dof_jntid] != mujoco.mjtJoint.mjJNT_SLIDE
-    bent = np.where(
-        hinges & np.isin(np.arange(model.nv), first.moment_colind[first.actuator_moment != 0]),
-        abs(turned),
-        0,
-    )
+    driven = np.isin(np.arange(model.nv), first.moment_colind[first.actuator_moment != 0])
+    bent = np.where(hinges & driven, abs(turned), 0)
     for tree in range(model.ntree):
         own, bodies = model.dof_treeid == tree, np.flatnonzero(model.body_treeid == tree)
         root, joint = bodies[0], model.joint(model.dof_jntid[(bent * own).argmax()])
         size = np.hypot.reduce(first.xipos[bodies] - first.subtree_com[root], 1).max()
-        sunk = (
-            (data.subtree_com[root] - first.subtree_com[root])
-            @ gravity
-            / (np.hypot.reduce(gravity) or 1)
-        )
+        moved = data.subtree_com[root] - first.subtree_com[root]
+        sunk = moved @ gravity / (np.hypot.reduce(gravity) or 1)
         if bent[own].max() > BENT and sunk > SUNK * size:
             by = f"joint {joint.name or joint.id!r} by {bent[own].max():.2g} rad"
             yield f"{_body_name(model, root)} by {sunk:.2g} m, its {by}"
@@ -280,10 +264,8 @@ def mean_velocities(model: Any, data: Any, step: Advance, time: float = WINDOW) 
     axis = np.column_stack([turn[:, i, j] - turn[:, j, i] for i, j in ((2, 1), (0, 2), (1, 0))]) / 2
     sine = np.hypot.reduce(axis, 1, keepdims=True).clip(1e-30)
     angle = np.arctan2(sine, (np.trace(turn, axis1=1, axis2=2)[:, None] - 1) / 2)
-    mean: Array = np.hstack([data.xipos - place, axis * angle / sine]) / (
-        steps * model.opt.timestep
-    )
-    return mean
+    moved = np.hstack([data.xipos - place, axis * angle / sine])
+    return np.asarray(moved / (steps * model.opt.timestep))
 
 
 def step_to_most_contacts(model: Any, data: Any, step: Advance) -> None:
@@ -302,15 +284,12 @@ def loads_by_pair(model: Any, data: Any) -> dict[tuple[int, int], Array]:
     """What each pair of geoms bears: load, N, depth, m, number, and friction (3), N."""
     found: dict[tuple[int, int], Array] = {}
     force = np.zeros(6)
-    for k, (geoms, depth) in enumerate(
-        zip(data.contact.geom.tolist(), -data.contact.dist, strict=True)
-    ):
+    for k, geoms in enumerate(map(tuple, data.contact.geom.tolist())):
         mujoco.mj_contactForce(model, data, k, force)
         if force[0] > 0:
             friction = force[1:3] @ data.contact.frame[k, 3:].reshape(2, 3)
-            found[tuple(geoms)] = found.get(tuple(geoms), 0) + np.array(
-                [force[0], depth, 1, *friction]
-            )
+            borne = np.array([force[0], -data.contact.dist[k], 1, *friction])
+            found[geoms] = found.get(geoms, 0) + borne
     return found
 
 
@@ -319,16 +298,13 @@ def measured_slip(
 ) -> dict[str, Array]:
     """How deep each contact is, and how fast its bodies slip and turn, in a window's mean."""
     found = data.contact
-    depth = -found.dist[number]
-    drift = found.surfacevel[number, :2]
+    depth, drift = -found.dist[number], found.surfacevel[number, :2]
     frames = found.frame[number].reshape(-1, 3, 3)
     bodies = model.geom_bodyid[c.geoms]
     lever = found.pos[number][:, None] - data.xipos[bodies]
     velocity = mean_velocities(model, data, step, time)[bodies]
-    (first, second), turning = (
-        np.moveaxis(velocity, 1, 0)[..., :3],
-        np.diff(velocity[..., 3:], axis=1)[:, 0],
-    )
+    first, second = np.moveaxis(velocity, 1, 0)[..., :3]
+    turning = np.diff(velocity[..., 3:], axis=1)[:, 0]
     arms = np.cross(velocity[..., 3:], lever)
     slip = np.einsum("nij,nj->ni", frames[:, 1:], second + arms[:, 1] - first - arms[:, 0]) + drift
     return {

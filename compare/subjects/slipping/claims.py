@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 
@@ -21,6 +22,8 @@ _NR_NS = (Case.NR, Case.NS)
 _RR_RS = (Case.RR, Case.RS)
 _RR_SR = (Case.RR, Case.SR)
 _RR_SS = (Case.RR, Case.SS)
+_ON_THE_WALL = given(start="on the wall")
+_STABILITY = "slip_stability.stability"
 
 
 def _state(m: Measurement) -> Array:
@@ -97,30 +100,26 @@ def _bounds(
     when = all_of(_along(arrow, by), given(n_z=side)) if side else _along(arrow, by)
     power = "_square" if by == "stationary" else ""
     size = (lambda m: m.parameters.g / m.parameters.R) if from_rest else None
+    bounds = partial(Criterion, "bounds", when=when, by="slip_bounds")
     return (
-        Criterion(
-            "bounds",
-            f"gamma_zero{power}",
-            lambda m: bound(m).zero,
-            when=when,
-            size=size,
-            by="slip_bounds",
-        ),
-        Criterion(
-            "bounds", f"gamma_slope{power}", lambda m: bound(m).slope, when=when, by="slip_bounds"
-        ),
+        bounds(f"gamma_zero{power}", lambda m: bound(m).zero, size=size),
+        bounds(f"gamma_slope{power}", lambda m: bound(m).slope),
     )
+
+
+def _rs_stationary(m: Measurement) -> SlipBound | HeldBound:
+    """The bound (67) of a ball that goes round with the fluid."""
+    return slip_bounds.rr_to_rs_stationary(m.parameters)
 
 
 def _neutral_flow(quantity: str, case: Case, by: str) -> Criterion:
     """A criterion on a threshold: the flow at which a case is neutral with respect to slipping."""
-    return Criterion(
-        "thresholds",
-        quantity,
-        lambda m: slip_stability.neutral_flow(case, m.parameters.replace(omega_0=1.0)),
-        when=given(by=by),
-        by="slip_stability.neutral_flow",
-    )
+
+    def predict(m: Measurement) -> float:
+        return slip_stability.neutral_flow(case, m.parameters.replace(omega_0=1.0))
+
+    when = given(by=by)
+    return Criterion("thresholds", quantity, predict, when=when, by="slip_stability.neutral_flow")
 
 
 def _filippov_share(m: Measurement) -> float:
@@ -134,12 +133,17 @@ def _case_on_wall(m: Measurement) -> float:
     return float(Case.NR if stable else Case.NS)
 
 
+def _gammas(predict: Callable[[Measurement], float], when: When, by: str) -> Criterion:
+    """A criterion on how fast slips grow."""
+    return Criterion("growth", "gamma", predict, when=when, by=by)
+
+
 def _growth(arrow: tuple[Case, Case]) -> Iterator[Criterion]:
     """Criteria on slips along an arrow, at random or dragged, and on what follows them."""
     when = _along(arrow, "", "dragged")
-    yield Criterion("growth", "gamma", _gamma, when=when, by="slip_stability.gamma")
+    yield _gammas(_gamma, when, "slip_stability.gamma")
     if arrow == _NR_NS:
-        yield Criterion("growth", "gamma", _gamma_nr, when=when, by="slip_bounds.gamma_nr")
+        yield _gammas(_gamma_nr, when, "slip_bounds.gamma_nr")
     for protocol, ways in (
         ("growth", ("", "dragged", "sideways")),  # at rest RS and RN look the same
         ("bounds", ("held", "stationary")),
@@ -165,13 +169,12 @@ def _moving_force(m: Measurement) -> float:
 
 def _lift(inner: Case) -> Iterator[Criterion]:
     """Criteria on whether and where the ball lifts out of a case, and on the floor's force."""
-    when = given(inner=inner.name)
-    yield Criterion("lift", "lifts", _lifts, when=when, by="slip_stability: lift")
+    lift = partial(Criterion, "lift", when=given(inner=inner.name))
+    yield lift("lifts", _lifts, by="slip_stability: lift")
     if inner is not Case.RS:
-        yield Criterion("lift", "lift_onset", _lift_onset, when=when, by="slip_stability: lift")
+        yield lift("lift_onset", _lift_onset, by="slip_stability: lift")
     if inner is not Case.RR:
-        by = "analytic.contact_forces"
-        yield Criterion("lift", "moving_force_Ay", _moving_force, when=when, by=by)
+        yield lift("moving_force_Ay", _moving_force, by="analytic.contact_forces")
 
 
 CLAIMS = (
@@ -199,13 +202,7 @@ CLAIMS = (
         "On the wall alone slip in a direction grows in proportion to the friction that rolling "
         "needs in it, less "
         "what Coulomb's law allows: γ < 0 in all directions exactly where (13) holds.",
-        Criterion(
-            "growth",
-            "gamma",
-            _by_forces,
-            when=_along(_NR_NS, "", "dragged"),
-            by="analytic.contact_forces, (13)",
-        ),
+        _gammas(_by_forces, _along(_NR_NS, "", "dragged"), "analytic.contact_forces, (13)"),
     ),
     claim(
         "eq-61",
@@ -231,12 +228,7 @@ CLAIMS = (
         "(67)",
         "Going round with the fluid, the ball never begins to slip at the wall alone, but at ω₀ = "
         "0.",
-        *_bounds(
-            _RR_RS,
-            "stationary",
-            lambda m: slip_bounds.rr_to_rs_stationary(m.parameters),
-            from_rest=True,
-        ),
+        *_bounds(_RR_RS, "stationary", _rs_stationary, from_rest=True),
     ),
     claim(
         "eq-73",
@@ -282,13 +274,7 @@ CLAIMS = (
         "Above ω₀₂ a slight slip at the wall dies out and the ball rolls on; below, the ball keeps "
         "slipping.",
         *_bounds(_NR_NS, "stationary", lambda m: slip_bounds.nr_to_ns(m.parameters)),
-        Criterion(
-            "settled",
-            "case",
-            _case_on_wall,
-            when=given(start="on the wall"),
-            by="slip_stability.stability",
-        ),
+        Criterion("settled", "case", _case_on_wall, when=_ON_THE_WALL, by=_STABILITY),
     ),
     claim(
         "eq-69",
@@ -303,9 +289,7 @@ CLAIMS = (
         "Rolling is stable with respect to slipping up to a flow at which it is neutral, and "
         "unstable beyond (on the "
         "wall alone the other way round); at rest slip at the wall neither grows nor dies out.",
-        Criterion(
-            "growth", "gamma", _gamma, when=_along(_RR_RS, "rest"), by="slip_stability.gamma"
-        ),
+        _gammas(_gamma, _along(_RR_RS, "rest"), "slip_stability.gamma"),
         _neutral_flow("omega_01", Case.RR, "onset of slip"),
         _neutral_flow("omega_02", Case.NR, "onset of sliding on the wall"),
         _neutral_flow("omega_03", Case.RR, "loss of the floor"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 import analytic
@@ -18,7 +20,7 @@ from model.cases import TRAITS
 from model.kinematics import VARIABLES, state_units
 
 _JACOBIAN = "analytic.stationary_solutions: eigenvalues of the exact Jacobian"
-_LEANING = "analytic.leaning_modes"
+_LEANING, _LINEAR = "analytic.leaning_modes", "exponential of the exact Jacobian"
 
 
 def _stationary(m: Measurement) -> StationarySolution:
@@ -83,39 +85,24 @@ def _propagator(case: Case, x: tuple[float, ...], p: Parameters, time: float) ->
 
 def _criteria(case: Case) -> tuple[Criterion, ...]:
     """Criteria on all eigenvalues of the stationary state of a case."""
-    when = given(case=case.name)
-    leans = case is Case.SR
+    rates = partial(Criterion, "rates", when=given(case=case.name))
     return (
-        Criterion(
-            "rates",
-            "decay_rate",
-            lambda m: -_mode(m).real,
-            when=when,
-            size=_mode_size,
-            by=_JACOBIAN,
-        ),
-        Criterion(
-            "rates", "frequency", lambda m: _mode(m).imag, when=when, size=_mode_size, by=_JACOBIAN
-        ),
-        Criterion(
-            "rates",
-            "response",
-            _response,
-            when=when,
-            by=_LEANING if leans else "exponential of the exact Jacobian",
-        ),
-        # The slowest of the decays, whatever grows or stays besides.
-        Criterion(
-            "rates",
-            "slowest_decay",
-            lambda m: 1 / analytic.slowest_time_constant(_stationary(m)),
-            when=when,
-            by="analytic.slowest_time_constant",
-        ),
+        rates("decay_rate", lambda m: -_mode(m).real, size=_mode_size, by=_JACOBIAN),
+        rates("frequency", lambda m: _mode(m).imag, size=_mode_size, by=_JACOBIAN),
+        rates("response", _response, by=_LEANING if case is Case.SR else _LINEAR),
+        rates("slowest_decay", _slowest, by="analytic.slowest_time_constant"),
     )
 
 
-def _slowest_decay(m: Measurement) -> float:
+def _slowest(m: Measurement) -> float:
+    """The slowest of the decays, whatever grows or stays besides, s-1."""
+    return 1 / analytic.slowest_time_constant(_stationary(m))
+
+
+_FIRST_OF_SR = given(case="SR", mode=1)
+
+
+def _leans(m: Measurement) -> float:
     """The slowest decay of SR: that of leaning below omega_03, where it grows."""
     decay = -theory(analytic.leaning_modes, m.parameters)[0].real
     return float(decay[0] if m.parameters.omega_0 < thresholds_of(m).omega_03 else min(decay))
@@ -141,14 +128,7 @@ CLAIMS = (
         "In SR a load on the floor dies out above ω₀₃ = √(g/jR) and grows "
         "below, at the rates of the eigenvalues of f_SR.",
         *_criteria(Case.SR),
-        Criterion(
-            "rates",
-            "decay_rate",
-            _slowest_decay,
-            when=given(case="SR", mode=1),
-            size=_mode_size,
-            by=_LEANING,
-        ),
+        Criterion("rates", "decay_rate", _leans, when=_FIRST_OF_SR, size=_mode_size, by=_LEANING),
         text=Text.CORRECTED,
         reason="With A_y = 0 the state is on the border to NR: the eigenvalues show on the side "
         "where the ball leans on the floor; on the other it lifts off, and its height is then "

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 from scipy.optimize import brentq
@@ -27,10 +28,15 @@ def _threshold(
     quantity: str, when: When = lambda m: m.at["by"] != SLIPPING, protocol: str = "thresholds"
 ) -> Criterion:
     """A criterion on a threshold, which `analytic.thresholds` predicts."""
-    by = f"{_BY}: {quantity}"
-    return Criterion(
-        protocol, quantity, lambda m: float(getattr(thresholds_of(m), quantity)), when=when, by=by
-    )
+
+    def predict(m: Measurement) -> float:
+        return float(getattr(thresholds_of(m), quantity))
+
+    return Criterion(protocol, quantity, predict, when=when, by=f"{_BY}: {quantity}")
+
+
+_thresholds = partial(Criterion, "thresholds")
+"""A criterion on what this protocol measures."""
 
 
 def _unstable_quantity(m: Measurement) -> float:
@@ -64,6 +70,18 @@ def _end_of_rolling(name: str, p: Parameters) -> float:
     return float(brentq(_HOLDS[name], 0.01 * unit, 100 * unit, args=(p,), rtol=1e-12))
 
 
+def _holds(name: str) -> Iterator[Criterion]:
+    """Criteria on where rolling ends, by one of `_HOLDS`."""
+
+    def predict(m: Measurement) -> float:
+        return theory(_end_of_rolling, name, m.parameters.replace(omega_0=1.0))
+
+    for quantity in ("omega_01", "omega_03"):
+        yield _thresholds(
+            quantity, predict, when=lambda m: m.parameters.mu < 1, by=f"rolling_forces.{name}"
+        )
+
+
 CLAIMS = (
     claim(
         "table-5-P3",
@@ -76,19 +94,7 @@ CLAIMS = (
         "(12), (13), (22)",
         "Rolling at both points goes on just as long as forces within both friction cones admit "
         "it, for μ < 1.",
-        *(
-            Criterion(
-                "thresholds",
-                quantity,
-                lambda m, name=name: theory(
-                    _end_of_rolling, name, m.parameters.replace(omega_0=1.0)
-                ),  # type: ignore[misc]
-                when=lambda m: m.parameters.mu < 1,
-                by=f"rolling_forces.{name}",
-            )
-            for name in _HOLDS
-            for quantity in ("omega_01", "omega_03")
-        ),
+        *(criterion for name in _HOLDS for criterion in _holds(name)),
     ),
     claim(
         "table-5-P2",
@@ -109,11 +115,8 @@ CLAIMS = (
         "With η > j two-point rolling ends at ω₀₃: below, a ball pressed to the floor settles in "
         "it; above, it leaves it.",
         _threshold("omega_03"),
-        Criterion(
-            "thresholds",
-            "lifts",
-            lambda m: math.isnan(thresholds_of(m).omega_01),
-            by=f"{_BY}: omega_01",
+        _thresholds(
+            "lifts", lambda m: math.isnan(thresholds_of(m).omega_01), by=f"{_BY}: omega_01"
         ),
     ),
     claim(
@@ -121,11 +124,8 @@ CLAIMS = (
         "Table 5, F",
         "The stable branch of slipping at both points ends in a fold at ω₀₄, where there is one.",
         _threshold("omega_04"),
-        Criterion(
-            "thresholds",
-            "folds",
-            lambda m: math.isfinite(thresholds_of(m).omega_04),
-            by=f"{_BY}: omega_04",
+        _thresholds(
+            "folds", lambda m: math.isfinite(thresholds_of(m).omega_04), by=f"{_BY}: omega_04"
         ),
     ),
     claim(
@@ -144,11 +144,8 @@ CLAIMS = (
         "(87), Fig. 7",
         "Slipping at both points ends in a fold for η_cr < η < j; for η < η_cr it passes to the "
         "state carried by the wall at ω₀₂, without a jump.",
-        Criterion(
-            "thresholds",
-            "folds",
-            lambda m: m.parameters.eta > thresholds_of(m).eta_cr,
-            by=f"{_BY}: eta_cr",
+        _thresholds(
+            "folds", lambda m: m.parameters.eta > thresholds_of(m).eta_cr, by=f"{_BY}: eta_cr"
         ),
         Criterion(
             "birth",
@@ -162,20 +159,18 @@ CLAIMS = (
         "one-fold",
         "after Prop. 7",
         "There is only one fold ω₀₄, and it lies above ω₀₁ and ω₀₂.",
-        Criterion(
-            "thresholds",
+        _thresholds(
             "omega_04",
             lambda m: max(thresholds_of(m).omega_01, thresholds_of(m).omega_02),
             relation=Relation.AT_LEAST,
             by=f"{_BY}: omega_01, omega_02",
         ),
-        Criterion(
-            "thresholds",
+        _thresholds(
             "folds",
             lambda m: bifurcation.number_of_folds(m.parameters),
             by="diagram.number_of_folds",
         ),
-        Criterion("thresholds", "omega_04", _greatest_flow, by="slipping_branch.states"),
+        _thresholds("omega_04", _greatest_flow, by="slipping_branch.states"),
     ),
 )
 SECTIONS = {"Bifurcations": CLAIMS}
