@@ -54,34 +54,42 @@ class Parser(argparse.ArgumentParser):
         raise InputError(f"{message}; see '{self.prog} --help'")
 
     def parse_known_args(self, *given: Any) -> tuple[argparse.Namespace, list[str]]:  # type: ignore[override]
-        """As argparse does; no output may be a file that another argument names, or a link to
-        one."""
-        for word in given[0]:  # one dash before a long name would be a short option and its value
+        """As argparse does, but for what that takes in silence, or tells of in other words."""
+        self._refuse_one_dash(given[0])
+        found, rest = super().parse_known_args(*given)
+        self._refuse_what_is_left(rest)
+        self._keep_rules(given[0])
+        self._refuse_to_write_what_is_read(found)
+        return found, rest
+
+    def _refuse_one_dash(self, words: Iterable[str]) -> None:
+        """One dash before a long name would be a short option and its value."""
+        for word in words:
             option = word.partition("=")[0].replace("_", "-")
             if re.match("-[^-]", option) and f"-{option}" in self._option_string_actions:
                 self.error(f"there is no option {option!r}: it is '-{option}'")
-        found, rest = super().parse_known_args(*given)
+
+    def _refuse_what_is_left(self, rest: Iterable[str]) -> None:
+        """Words that are neither options nor their values."""
         for word in rest:
             if word.startswith("-"):
                 option = word.partition("=")[0]
-                self.error(
-                    f"there is no option "
-                    f"{option!r}{suggestion(option, self._option_string_actions)}"
-                )
+                similar = suggestion(option, self._option_string_actions)
+                self.error(f"there is no option {option!r}{similar}")
             self.error(f"{word!r} is one argument too many")
+
+    def _keep_rules(self, words: Iterable[str]) -> None:
+        """Options without those that they need, or beside those that they exclude."""
         known = self._option_string_actions
-        there = {
-            known[word].option_strings[-1]
-            for each in given[0]
-            if (word := each.partition("=")[0]) in known
-        }
+        names = (word.partition("=")[0] for word in words)
+        there = {known[name].option_strings[-1] for name in names if name in known}
         for option, other, together in self.rules:
             if option in there and (other in there) != together:
-                self.error(
-                    f"{option} is for {other}"
-                    if together
-                    else f"{option} has no effect beside {other}"
-                )
+                why = f"is for {other}" if together else f"has no effect beside {other}"
+                self.error(f"{option} {why}")
+
+    def _refuse_to_write_what_is_read(self, found: argparse.Namespace) -> None:
+        """An output that another argument names, too, or that is a link to such a file."""
         for action in (each for each in self._actions if isinstance(each.type, Output)):
             output: Path | None = getattr(found, action.dest, None)
             others = (value for name, value in vars(found).items() if name != action.dest)
@@ -90,7 +98,6 @@ class Parser(argparse.ArgumentParser):
                     if output and path.samefile(output):
                         named = "/".join(action.option_strings)
                         self.error(f"argument {named}: {str(output)!r} is read and would be lost")
-        return found, rest
 
 
 def _named_files(values: Iterable[Any]) -> Iterator[Path]:

@@ -181,28 +181,13 @@ def summary(verdicts: Sequence[Verdict], report: Path) -> Text:
 
 def checks(verdict: Verdict) -> Table:
     """A table of every measured number of a claim beside its prediction."""
-    rows = [
-        [
-            "set",
-            "ω₀ (rad/s)",
-            "quantity",
-            "predicted",
-            "measured",
-            "deviation",
-            "tolerance",
-            "",
-            "with",
-        ]
-    ]
+    head = ["set", "ω₀ (rad/s)", "quantity", "predicted", "measured", "deviation", "tolerance"]
+    rows = [[*head, "", "with"]]
     for check in verdict.checks:
         m = check.measurement
         numbers = wording.value(m, check.predicted), wording.value(m, m.value)
         sizes = wording.size(check.deviation, "+"), wording.size(check.tolerance)
-        found = [
-            f"{wording.SYMBOLS[m.quantity]} {readable(m.unit)}".rstrip(),
-            *numbers,
-            *sizes,
-            wording.mark(check),
-        ]
-        rows.append([m.set, f"{m.parameters.omega_0:.6g}", *found, wording.conditions(m.at)])
+        what = f"{wording.SYMBOLS[m.quantity]} {readable(m.unit)}".rstrip()
+        found = [what, *numbers, *sizes, wording.mark(check), wording.conditions(m.at)]
+        rows.append([m.set, f"{m.parameters.omega_0:.6g}", *found])
     return pages.table(f"{verdict.claim.id}  {verdict.claim.statement}", rows, no_wrap=True)
