@@ -18,7 +18,7 @@ from markdown_it import MarkdownIt
 from compare.claim import Outcome, Verdict
 from compare.gallery import FIGURES, figures_of, pictures
 from compare.kit import pages
-from compare.kit.drawing import Evidence
+from compare.kit.drawing import Evidence, Figures
 from compare.kit.levels import Level
 from compare.kit.record import Check, Measurement, Records
 from compare.kit.workers import Spread
@@ -51,7 +51,7 @@ def render(
     evidence: Evidence, verdicts: Sequence[Verdict], summary: Summary, spread: Spread = map
 ) -> str:
     """The page as text; what was not run is named in one line."""
-    directory, option = evidence.directory, _OPTIONS[Level[summary.level]]
+    directory = evidence.directory
     ran = [verdict for verdict in verdicts if verdict.outcome is not Outcome.NOT_RUN]
     free = {name: each for name, each in FIGURES.items() if not each.claims}
     beside = {verdict.claim.id: figures_of(verdict.claim.id) for verdict in ran if verdict.checks}
@@ -59,24 +59,11 @@ def render(
     for own in beside.values():
         drawings |= own
     figures, letters = pictures(evidence, drawings, spread)
-    shown: dict[str, str] = {}
-    sections: dict[str, list[dict[str, Any]]] = {}
-    for verdict in ran:
-        claim, own = verdict.claim, beside.get(verdict.claim.id, {})
-        row = _row(verdict) | {
-            "figures": [figures[name] for name in own if name not in shown],
-            "elsewhere": [(figures[name], shown[name]) for name in own if name in shown],
-            "repeat": f"dualball validate --claim {claim.id}{option} -o {directory.resolve().name}",
-        }
-        # a figure of several claims stands beside the first
-        shown = dict.fromkeys(own, claim.id) | shown
-        sections.setdefault(claim.section, []).append(row)
     first = "characteristic"  # a meter's reading by theory and every engine: what all is about
     apart = [figures[name] for name in sorted(free, key=lambda name: name != first)]
     measured = {name for m in evidence.records.measurements for name in m.runs}
     sets = {m.set for m in evidence.records.measurements}
-    known = summary.provenance
-    files = sum(len(names) for steps in summary.measurements.values() for names in steps.values())
+    repeat = f"{_OPTIONS[Level[summary.level]]} -o {directory.resolve().name}"
     return pages.render(
         "compare.report",
         "report.html",
@@ -94,7 +81,7 @@ def render(
             (str(len(measured)), f"simulations with {len(sets)} parameter sets"),
         ],
         figures=[figure for figure in apart if not figure["gap"]],
-        sections=sections,
+        sections=_sections(ran, beside, figures, repeat),
         outcomes=sorted({verdict.outcome for verdict in ran}),
         beside=sorted(
             {f"{each.engine}: {each.outcome}" for verdict in ran for each in verdict.engines[1:]}
@@ -106,17 +93,45 @@ def render(
         not_drawn=[f"{figure['title']}: {figure['gap']}" for figure in apart if figure["gap"]],
         command=f"dualball validate --full -o {directory.resolve().name}",
         errata=errata(),
-        provenance={
-            "made": known.get("created", ""),
-            "level": summary.level.lower(),
-            "versions": ", ".join(
-                f"{name} {version}" for name, version in known.get("versions", {}).items()
-            ),
-            "commit": known.get("commit", "") or "not from a checkout",
-            "machine": known.get("machine", ""),
-            "measurements": f"{files} files, listed in {results.SUMMARY}",
-        },
+        provenance=_provenance(summary),
     )
+
+
+def _sections(
+    ran: Sequence[Verdict],
+    beside: Mapping[str, Figures],
+    figures: Mapping[str, dict[str, str]],
+    repeat: str,
+) -> dict[str, list[dict[str, Any]]]:
+    """The rows of claims by sections, with their figures: one of several claims stands beside the
+    first. `repeat` is the end of the command that measures a claim again."""
+    shown: dict[str, str] = {}
+    sections: dict[str, list[dict[str, Any]]] = {}
+    for verdict in ran:
+        claim, own = verdict.claim, beside.get(verdict.claim.id, {})
+        row = _row(verdict) | {
+            "figures": [figures[name] for name in own if name not in shown],
+            "elsewhere": [(figures[name], shown[name]) for name in own if name in shown],
+            "repeat": f"dualball validate --claim {claim.id}{repeat}",
+        }
+        shown = dict.fromkeys(own, claim.id) | shown
+        sections.setdefault(claim.section, []).append(row)
+    return sections
+
+
+def _provenance(summary: Summary) -> dict[str, str]:
+    """By which program, when, and from which files the page was made."""
+    known = summary.provenance
+    versions = known.get("versions", {})
+    files = sum(len(names) for steps in summary.measurements.values() for names in steps.values())
+    return {
+        "made": known.get("created", ""),
+        "level": summary.level.lower(),
+        "versions": ", ".join(f"{name} {version}" for name, version in versions.items()),
+        "commit": known.get("commit", "") or "not from a checkout",
+        "machine": known.get("machine", ""),
+        "measurements": f"{files} files, listed in {results.SUMMARY}",
+    }
 
 
 def _row(verdict: Verdict) -> dict[str, Any]:
