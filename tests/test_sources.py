@@ -36,8 +36,6 @@ EXCEPTIONS = {
     "compare/bench/closed_forms.py:closed_form",
     # a figure of two panels
     "compare/subjects/unsteady/figures.py:draw_unsteady",
-    # all that a measured number is made of
-    "compare/kit/record.py:measurement",
 }
 SAME = {
     # what every subject, file format, adapter or page has

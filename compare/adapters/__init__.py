@@ -11,6 +11,6 @@ KNOWN = {
     "sapien": "sapien 3.0.3",
 }
 """Packages and versions with which they are known to work, also where one can't be imported."""
-ASKED = {"pybullet": "v1", "drake": "D+", "dart": "<3", "rapier": ">4", "sapien": "hH"}
+STUDIED = {"pybullet": "v1", "drake": "D+", "dart": "<3", "rapier": ">4", "sapien": "hH"}
 """Those that are asked of the study's claims: marks in figures, in best settings and as they come,
 which is NAME-defaults."""

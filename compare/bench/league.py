@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from compare.adapters import ASKED
+from compare.adapters import STUDIED
 from compare.bench.case import TOLERANCE, VERSION
 from compare.bench.exact import cases
 from compare.bench.runner import FLOORS, Result, run_all
@@ -31,7 +31,7 @@ ENTRIES: dict[str, str] = {
     "siconos": f"{_OWN}.siconos:best",
     **{
         f"{name}{suffix}": f"{_OWN}.{name}:{which}"
-        for name in ASKED
+        for name in STUDIED
         for suffix, which in (("", "best"), ("-defaults", "defaults"))
     },
     "mujoco-warp": f"{_OWN}.mujoco_warp:best",

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from compare.adapters import ASKED
+from compare.adapters import STUDIED
 from compare.kit.pages import readable
 from model import InputError, Parameters, drag
 from model.errors import suggestion
@@ -212,7 +212,7 @@ def engine(name: str) -> Any:
         raise argparse.ArgumentTypeError(str(error)) from error
 
 
-FOREIGN = ", ".join(sorted(ASKED))
+FOREIGN = ", ".join(sorted(STUDIED))
 """Those that others have written, each as NAME and NAME-defaults."""
 PREFIX = "parameter_"
 """How the destinations of options begin that are parameters of the ball."""

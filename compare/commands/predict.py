@@ -134,7 +134,7 @@ def reading(p: Parameters) -> str:
     )
 
 
-Shown = Callable[[float, int], str]
+Digits = Callable[[float, int], str]
 """A number as text, with so many digits at most."""
 
 
@@ -159,7 +159,7 @@ def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
     ]
 
 
-def _answer(p: Parameters, data: dict[str, Any], shown: Shown) -> list[Text]:
+def _answer(p: Parameters, data: dict[str, Any], shown: Digits) -> list[Text]:
     """The reading at the flow, and how far the operating range goes."""
     because = data["operating_range_ends"]["because"]
     reach = f"It has no operating range: {because}."
@@ -170,7 +170,7 @@ def _answer(p: Parameters, data: dict[str, Any], shown: Shown) -> list[Text]:
     return [Text(f"At ω₀ = {p.omega_0:g} rad/s {data['reading']}.", "bold"), Text(reach, "bold")]
 
 
-def _thresholds(data: dict[str, Any], shown: Shown) -> Table:
+def _thresholds(data: dict[str, Any], shown: Digits) -> Table:
     """A table of all thresholds."""
     rows = [["", "value", "what happens there"]]
     for name, value in data["thresholds"].items():
@@ -180,7 +180,7 @@ def _thresholds(data: dict[str, Any], shown: Shown) -> Table:
     return pages.table("Thresholds", rows, justify="left")
 
 
-def _solutions(p: Parameters, data: dict[str, Any], shown: Shown) -> Table:
+def _solutions(p: Parameters, data: dict[str, Any], shown: Digits) -> Table:
     """A table of all stationary solutions, dim those that attract nothing."""
     solutions = data["solutions"]
     rows = [
@@ -235,7 +235,7 @@ def _set(p: Parameters) -> list[Table | Text]:
     return [head, Text(f"κ = c√(R/g) = {p.kappa:.6g}, Ω₀ = ω₀√(R/g) = {p.Omega_0:.6g}", "dim")]
 
 
-def _complex(value: complex, largest: float, shown: Shown) -> str:
+def _complex(value: complex, largest: float, shown: Digits) -> str:
     """A complex number and its conjugate; a real part that is round-off is 0."""
     real = value.real if abs(value.real) > 1e-12 * largest else 0.0
     return shown(real, 4) + (f" ± {shown(abs(value.imag), 4)}i" if value.imag else "")
@@ -244,7 +244,7 @@ def _complex(value: complex, largest: float, shown: Shown) -> str:
 _STABILITY = {each.value: each.value.removesuffix(" stable") for each in analytic.Stability} | {
     analytic.Stability.ALGEBRAIC.value: "algebraically"
 }
-_ROWS: dict[str, Callable[[dict[str, Any], Shown], str]] = {
+_ROWS: dict[str, Callable[[dict[str, Any], Digits], str]] = {
     "ω_c (rad/s)": lambda s, shown: shown(s["x"]["omega_c"], 8),
     "ω̃_x (rad/s)": lambda s, shown: shown(s["x"]["slip_x"], 8),
     "ω̃_y (rad/s)": lambda s, shown: shown(s["x"]["slip_y"], 8),

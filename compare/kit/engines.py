@@ -15,7 +15,7 @@ import numpy as np
 
 import analytic
 import mjsim
-from compare.adapters import ASKED, KNOWN, siconos, vessel
+from compare.adapters import KNOWN, STUDIED, siconos, vessel
 from compare.adapters.free import Library
 from compare.kit.scales import time_unit
 from mjsim import ContactSettings, RigidContacts
@@ -259,7 +259,7 @@ DEFAULTS = replace(
 )
 _OTHERS = (
     *_adapted(siconos.LIBRARY, "p"),
-    *(each for name, marks in ASKED.items() for each in _adapted(_PACKAGES[name], marks)),
+    *(each for name, marks in STUDIED.items() for each in _adapted(_PACKAGES[name], marks)),
 )
 USUAL_ENGINES = (MUJOCO, PLAIN, DEFAULTS)
 """Who is asked of a claim where no engine is named: the one on trial, and two beside it."""

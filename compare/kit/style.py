@@ -57,7 +57,7 @@ HALO: dict[str, Any] = {"boxstyle": "round,pad=0.12", "fc": "white", "ec": "none
 """Background of a name that stands on lines."""
 NAME: dict[str, Any] = {"textcoords": "offset points", "fontsize": 9, "bbox": HALO}
 """How a name is written beside what it names."""
-MEASURED: dict[str, Any] = {"ms": 5, "capsize": 2.5, "elinewidth": 1, "zorder": 4, "ls": "none"}
+BARS: dict[str, Any] = {"ms": 5, "capsize": 2.5, "elinewidth": 1, "zorder": 4, "ls": "none"}
 """Measured points, with bars."""
 SYMBOLS = {"mu": "μ", "eta": "η", "j": "j", "kappa": "κ", "omega_0": "ω₀"}
 THRESHOLD_LINES: dict[str, tuple[str, Line]] = {
@@ -275,7 +275,7 @@ def points(
             shown = [m for m in own if (COVERAGE * unit * m.uncertainty > longest) == pale]
             bars = [math.nan if pale else COVERAGE * unit * m.uncertainty for m in shown]
             named = not pale or len(shown) == len(own)
-            usual = mark_of(engine) | MEASURED | {"label": f"{'' if named else '_'}{engine}{way}"}
+            usual = mark_of(engine) | BARS | {"label": f"{'' if named else '_'}{engine}{way}"}
             usual |= {"alpha": 0.4} if pale else {}
             if shown:
                 places = [x(m) for m in shown], [unit * y(m) for m in shown]
