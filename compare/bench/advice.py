@@ -96,11 +96,8 @@ def apply(model: Any, option: str, value: Sequence[float]) -> None:
     """Set one option of a model; softness only of what is softer than the value."""
     if option in ("impratio", "cone", "timestep"):
         setattr(model.opt, option, value[0])
-    for own in (
-        getattr(model, f"{kind}_{option}")
-        for kind in ("geom", "pair")
-        if option in ("solref", "solimp")
-    ):
+    kinds = ("geom", "pair") if option in ("solref", "solimp") else ()
+    for own in (getattr(model, f"{kind}_{option}") for kind in kinds):
         if option == "solimp":
             own[:, :2] = np.maximum(own[:, :2], value)
         else:
@@ -210,8 +207,6 @@ def _two_digits(value: float) -> float:
 
 def _worst(c: Contacts, part: Array, quantity: str) -> float:
     """The worst creep, m/s, or depth, m, or the largest stable step, s, of some contacts."""
-    return (
-        c.subset(part).largest_step()
-        if quantity == "largest_step"
-        else float(getattr(c.law(), quantity)[part].max())
-    )
+    if quantity == "largest_step":
+        return c.subset(part).largest_step()
+    return float(getattr(c.law(), quantity)[part].max())

@@ -91,10 +91,9 @@ class ContactCase(Scene):
         gaps, slips = [np.zeros((0, len(states)))], [np.zeros((0, len(states)))]
 
         def add_contact(gap: Array, slip: Array, normal: Array) -> None:
+            along = slip - np.sum(slip * normal, axis=1)[:, None] * normal
             gaps.append(gap[None])
-            slips.append(
-                np.linalg.norm(slip - np.sum(slip * normal, axis=1)[:, None] * normal, axis=1)[None]
-            )
+            slips.append(np.linalg.norm(along, axis=1)[None])
 
         for surface in self.surfaces:
             away = position - surface.point
@@ -108,19 +107,12 @@ class ContactCase(Scene):
             gap = height - reach(body, normal)
             arm = -(reach(body, normal) + np.minimum(gap, 0.0) / 2)[:, None] * normal
             moves = surface.velocity + surface.turning * np.cross([0.0, 0.0, 1.0], away + arm)
-            add_contact(
-                gap,
-                velocity + (np.cross(spin, arm) if body.shape == "sphere" else 0) - moves,
-                normal,
-            )
+            turns = np.cross(spin, arm) if body.shape == "sphere" else 0
+            add_contact(gap, velocity + turns - moves, normal)
         if self.under:
             apart = states[:, :3] - position
-            height = np.sum(apart * normal, axis=1)
-            add_contact(
-                height - reach(self.body, normal) - reach(body, normal),
-                states[:, 3:6] - velocity,
-                normal,
-            )
+            gap = np.sum(apart * normal, axis=1) - reach(self.body, normal) - reach(body, normal)
+            add_contact(gap, states[:, 3:6] - velocity, normal)
         if self.joint:
             add_contact(np.zeros(len(states)), velocity, np.zeros(3))
         return np.concatenate(gaps).T, np.concatenate(slips).T
@@ -131,16 +123,9 @@ class ContactCase(Scene):
 
     def to_mapping(self) -> dict[str, Any]:
         """The case without its MJCF as JSON-able data; scales that are infinite are None."""
-        data = vars(self) | {
-            "schema": "dualball-case",
-            "version": VERSION,
-            "steps": TIME_STEPS,
-            "tolerance": TOLERANCE,
-        }
-        data |= {
-            "turned": self.in_cylinder,
-            "wrong": {name: self.error(states) for name, states in self.wrong.items()},
-        }
+        wrong = {name: self.error(states) for name, states in self.wrong.items()}
+        data = vars(self) | {"schema": "dualball-case", "version": VERSION, "steps": TIME_STEPS}
+        data |= {"tolerance": TOLERANCE, "turned": self.in_cylinder, "wrong": wrong}
         del data["motion"]
         return dict(plain(data))
 
@@ -149,9 +134,8 @@ def reach(body: Body, normal: Array) -> Array:
     """How far a body in its first orientation extends from its centre against normals (n, 3), m."""
     if body.shape == "disc":
         along = np.abs(in_body_axes(body.orientation, normal)[..., 2])
-        return np.asarray(
-            body.size[0] * np.sqrt(np.maximum(1 - along**2, 0.0)) + body.size[1] * along
-        )
+        across = np.sqrt(np.maximum(1 - along**2, 0.0))
+        return np.asarray(body.size[0] * across + body.size[1] * along)
     if body.shape == "box":
         return np.asarray(np.abs(in_body_axes(body.orientation, normal)) @ np.array(body.size))
     return np.full(len(normal), body.size[0] + (body.size[2] if body.shape == "tripod" else 0.0))
@@ -168,29 +152,20 @@ def read(path: Path) -> ContactCase:
         If it is of another schema or version."""
     with reading_json(path, "exact case") as data:
         if (schema := data["schema"]) != "dualball-case":
-            raise InputError(
-                f"{path} is no exact case: its schema is {schema!r}, not 'dualball-case'"
-            )
+            why = f"its schema is {schema!r}, not 'dualball-case'"
+            raise InputError(f"{path} is no exact case: {why}")
         if (written := data["version"]) not in range(1, VERSION + 1):
-            raise InputError(
-                f"{path} is of version {written!r} of the exact cases; this program reads 1 to "
-                f"{VERSION}"
-            )
-        own = {
-            each.name: data[each.name]
-            for each in fields(ContactCase)
-            if each.name in data and each.name != "wrong"
-        }
+            reads = f"this program reads 1 to {VERSION}"
+            raise InputError(f"{path} is of version {written!r} of the exact cases; {reads}")
+        names = {each.name for each in fields(ContactCase)} - {"wrong"}
+        own = {name: value for name, value in data.items() if name in names}
         own["scales"] = [math.inf if scale is None else scale for scale in own["scales"]]
         own["surfaces"] = [Surface(**_tuples(surface)) for surface in own["surfaces"]]
         own |= {name: Body(**_tuples(own[name])) for name in ("body", "under") if own.get(name)}
-        return ContactCase(
-            **_tuples(own) | {name: np.array(own[name], float) for name in ("times", "exact")}
-        )
+        arrays = {name: np.array(own[name], float) for name in ("times", "exact")}
+        return ContactCase(**_tuples(own) | arrays)
 
 
 def _tuples(data: Mapping[str, Any]) -> dict[str, Any]:
     """Data as JSON has it, with tuples for lists."""
-    return {
-        name: tuple(value) if isinstance(value, list) else value for name, value in data.items()
-    }
+    return {name: tuple(v) if isinstance(v, list) else v for name, v in data.items()}

@@ -7,10 +7,9 @@ tenth of a second, or of a second where some of them still move."""
 from __future__ import annotations
 
 import copy
-import dataclasses
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import mujoco
@@ -135,12 +134,9 @@ def forecast(
             return False
 
     change, left = advice.best_change(scene, worst.name, worst.members, worst.harm, calm)
-    creeps = (
-        max(pair.harm["creep"] for pair in found.pairs) > 1 and 1 < left["creep"].max() < math.inf
-    )
-    return dataclasses.replace(
-        found, change=change, remedy=advice.remedy_code(model) if creeps else ""
-    )
+    creeps = max(pair.harm["creep"] for pair in found.pairs) > 1
+    remedy = advice.remedy_code(model) if creeps and 1 < left["creep"].max() < math.inf else ""
+    return replace(found, change=change, remedy=remedy)
 
 
 def follow_advice(
@@ -162,23 +158,17 @@ def follow_advice(
         advice.apply(model, change.option, change.value)
         rest = settle(model, data, limit, control, tell=part(tell, 0, 2))
         after = _settled_anew(model, data, mujoco.mj_step, rest, control, good)
-        quantity = (
-            f"{change.quantity}_measured"
-            if change.quantity in ("creep", "depth")
-            else change.quantity
-        )
-        found = [getattr(pair, quantity) for pair in after.pairs if pair.name == change.pair]
-        before = dataclasses.replace(
-            before, change=dataclasses.replace(change, found=max(found, default=math.nan))
-        )
+        measured = "_measured" if change.quantity in ("creep", "depth") else ""
+        those = [pair for pair in after.pairs if pair.name == change.pair]
+        found = [getattr(pair, f"{change.quantity}{measured}") for pair in those]
+        change = replace(change, found=max(found, default=math.nan))
+        before = replace(before, change=change)
     if before.remedy:
         twin, state, law = advice.remedied(model, data)
         rest = settle(twin, state, limit, control, law, part(tell, 1, 2))
         held = _settled_anew(twin, state, law, rest, control, good)
-        nothing = [
-            dataclasses.replace(p, creep=0 * p.creep, turning=0 * p.turning) for p in held.pairs
-        ]
-        held = dataclasses.replace(held, pairs=tuple(nothing))
+        pairs = (replace(p, creep=0 * p.creep, turning=0 * p.turning) for p in held.pairs)
+        held = replace(held, pairs=tuple(pairs))
     return before, after, held
 
 

@@ -71,10 +71,9 @@ def sentences(f: Forecast) -> Iterator[str]:
             "stops early (tolerance)."
         )
     if f.settled.collapsed:
-        how = "To hold it up: --ctrl, --keyframe, or in Python control."
         yield (
-            f"Collapsed since the start: {few(f.settled.collapsed)}. The table is of how it "
-            f"lies. {how}"
+            f"Collapsed since the start: {few(f.settled.collapsed)}. The table is of how it lies. "
+            "To hold it up: --ctrl, --keyframe, or in Python control."
         )
     if moving:
         yield f"Not settled: {few(moving)}."
@@ -118,49 +117,32 @@ def _number(value: float, factor: float = 1, endless: str = "any") -> str:
     value *= factor
     if not math.isfinite(value):
         return endless if math.isinf(value) else "–"
-    return (
-        f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.3g}" if abs(value) >= 1e-3 else "0"
-    )
+    if abs(value) < 1e-3:
+        return "0"
+    return f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.3g}"
 
 
 def tables(f: Forecast, after: Forecast | None = None, held: Forecast | None = None) -> list[Table]:
     """Tables of the worst pairs at rest and in motion; what was measured is called found.
 
     Then what the change was made for, and the creep with the remedy, if these are given."""
-    rest = [
-        [
-            "pair",
-            "creep\nµm/s",
-            "found\nµm/s",
-            "turning\nµrad/s",
-            "found\nµrad/s",
-            "depth\nµm",
-            "found\nµm",
-        ]
-    ]
-    rest[0] += ["load\nN", "cone\n%", "short\n%"]
+    rest = [["pair", "creep\nµm/s", "found\nµm/s", "turning\nµrad/s", "found\nµrad/s"]]
+    rest[0] += ["depth\nµm", "found\nµm", "load\nN", "cone\n%", "short\n%"]
     motion = [["pair", "hover\nmm/s", "step\nms"]]
     for p in f.pairs[:SHOWN]:
         micro = p.creep, p.creep_measured, p.turning, p.turning_measured, p.depth, p.depth_measured
-        rest.append(
-            [
-                p.name,
-                *(_number(v, 1e6, "∞") for v in micro),
-                _number(p.load),
-                _number(p.cone, 100),
-                _number(p.short, 100),
-            ]
-        )
+        shares = _number(p.cone, 100), _number(p.short, 100)
+        rest.append([p.name, *(_number(v, 1e6, "∞") for v in micro), _number(p.load), *shares])
         motion.append([p.name, _number(p.hover, 1e3), _number(p.largest_step, 1e3)])
-    title = f"Pairs in contact: {len(f.pairs)}" + (
-        f", of which the {SHOWN} worst" if len(f.pairs) > SHOWN else ""
-    )
+    title = f"Pairs in contact: {len(f.pairs)}"
+    title += f", of which the {SHOWN} worst" if len(f.pairs) > SHOWN else ""
     shown = [(title, _without_empty_columns(rest)), ("In motion", _without_empty_columns(motion))]
     if after and f.change:
-        shown.append(
-            (f"With {f.change.written}", tables(after)[f.change.quantity == "largest_step"][1])
-        )
-    return shown + ([("With mjsim.Coulomb", tables(held)[0][1])] if held else [])
+        _, changed = tables(after)[f.change.quantity == "largest_step"]
+        shown.append((f"With {f.change.written}", changed))
+    if held:
+        shown.append(("With mjsim.Coulomb", tables(held)[0][1]))
+    return shown
 
 
 def _without_empty_columns(rows: list[list[str]]) -> list[list[str]]:
@@ -200,10 +182,5 @@ LEGEND = (
 def html(f: Forecast, after: Forecast | None, held: Forecast | None, file: str) -> str:
     """The forecast, and those after the change and with the remedy, as one self-contained page."""
     shown = tables(f, after, held)
-    said = {
-        "file": file,
-        "sentences": list(sentences(f)),
-        "paste": snippets(f, file),
-        "legend": LEGEND,
-    }
-    return pages.render("compare.bench", "forecast.html", tables=shown, **said)
+    said = {"sentences": list(sentences(f)), "paste": snippets(f, file), "legend": LEGEND}
+    return pages.render("compare.bench", "forecast.html", file=file, tables=shown, **said)

@@ -6,7 +6,7 @@ import itertools
 import math
 import statistics
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -71,9 +71,8 @@ def measure(
     def results_of(name: str) -> list[Result]:
         nonlocal done
         found = []
-        for result in run_all(
-            itertools.takewhile(lambda _: not over.is_set(), asked), engines[name], steps
-        ):
+        still = itertools.takewhile(lambda _: not over.is_set(), asked)
+        for result in run_all(still, engines[name], steps):
             found.append(result)
             done += 1
             show(f"{name}: {result.case}", done, total, 0)
@@ -92,27 +91,19 @@ def summary(league: Mapping[str, Sequence[Result]]) -> Rows:
     table = [["engine", "precision", "passed", *KINDS, "order", "cost"]]
     for name, results in ranked(league).items():
         own = [result for result in results if not result.skipped]
-        medians = [
-            _median(
-                r.error if math.isfinite(r.error) else math.inf
-                for r in own
-                if kinds[r.case] == each
-            )
-            for each in KINDS
-        ]
-        order, cost = (_median(v for v in values if math.isfinite(v)) for values in
-                       ([r.order for r in own], [r.cost for r in own]))  # fmt: skip
-        floor = FLOORS[own[0].engine.precision]
-        table.append(
-            [
-                name,
-                own[0].engine.precision,
-                f"{sum(r.passed for r in own)} of {len(own)}",
-                *(number(value, floor) for value in medians),
-                "" if math.isnan(order) else f"{order:.1f}",
-                "" if math.isnan(cost) else f"{cost:.2g}",
-            ]
+        errors: dict[str, list[float]] = {kind: [] for kind in KINDS}
+        for result in own:
+            lost = not math.isfinite(result.error)
+            errors[kinds[result.case]].append(math.inf if lost else result.error)
+        order = _median(r.order for r in own if math.isfinite(r.order))
+        cost = _median(r.cost for r in own if math.isfinite(r.cost))
+        precision, passed = own[0].engine.precision, sum(r.passed for r in own)
+        medians = [number(_median(errors[kind]), FLOORS[precision]) for kind in KINDS]
+        shown = (
+            "" if math.isnan(order) else f"{order:.1f}",
+            "" if math.isnan(cost) else f"{cost:.2g}",
         )
+        table.append([name, precision, f"{passed} of {len(own)}", *medians, *shown])
     return table
 
 
@@ -180,16 +171,9 @@ def declarations(league: Mapping[str, Sequence[Result]]) -> Rows:
     for name, results in league.items():
         if tried := [result for result in results if not result.skipped]:
             worst = max(tried, key=lambda r: r.error if math.isfinite(r.error) else math.inf)
-            engine, failed = worst.engine, f": {worst.failure}" if worst.failure else ""
-            table.append(
-                [
-                    name,
-                    engine.version,
-                    engine.declared,
-                    f"{worst.case}, {cell(worst)}{failed}",
-                    engine.note,
-                ]
-            )
+            engine, case = worst.engine, f"{worst.case}, {cell(worst)}"
+            case += f": {worst.failure}" if worst.failure else ""
+            table.append([name, engine.version, engine.declared, case, engine.note])
     return table
 
 
@@ -201,24 +185,20 @@ def notes(league: Mapping[str, Sequence[Result]]) -> Iterator[tuple[str, str]]:
             if reason := result.failure or result.skipped:
                 reasons.setdefault(reason, []).append(result.case)
         for reason, those in reasons.items():
-            yield (
-                f"{name}, {'all cases' if len(those) == len(results) else ', '.join(those)}",
-                reason,
-            )
+            which = "all cases" if len(those) == len(results) else ", ".join(those)
+            yield f"{name}, {which}", reason
 
 
 def to_mapping(league: Mapping[str, Sequence[Result]]) -> dict[str, Any]:
     """All results of the league as JSON-able data."""
     entries = {
-        name: [
-            vars(result) | {"order": result.order, "passed": result.passed} for result in results
-        ]
+        name: [vars(each) | {"order": each.order, "passed": each.passed} for each in results]
         for name, results in league.items()
     }
     return dict(plain({"version": VERSION, "tolerance": TOLERANCE, "engines": entries}))
 
 
-def _median(values: Iterator[float]) -> float:
+def _median(values: Iterable[float]) -> float:
     known = list(values)
     return statistics.median(known) if known else math.nan
 
@@ -230,11 +210,11 @@ def draw(league: Mapping[str, Sequence[Result]]) -> Figure:
     from compare.kit import style
 
     kinds = {case.name: case.kind for case in cases()}
-    shown = {
-        name: there
+    finite = {
+        name: [r for r in results if np.isfinite(r.errors).any()]
         for name, results in ranked(league).items()
-        if (there := [r for r in results if np.isfinite(r.errors).any()])
     }
+    shown = {name: results for name, results in finite.items() if results}
     families = list(dict.fromkeys(name.removesuffix("-defaults") for name in shown))
     figure, panels = style.panels(9.0, 4.4 + 0.19 * len(shown), 2, 2, sharex=True, sharey=True)
     for axes, each in zip(panels.ravel(), KINDS, strict=True):
@@ -243,23 +223,17 @@ def draw(league: Mapping[str, Sequence[Result]]) -> Figure:
             if not len(own):
                 continue
             known = np.isfinite(own[:, 1]).mean(0) > 0.5  # where the median is
-            cost, error = np.nanmedian(
-                np.where(np.isfinite(own[:, 1:]), own, np.nan)[..., known], axis=0
-            )
+            finite_ones = np.where(np.isfinite(own[:, 1:]), own, np.nan)[..., known]
+            cost, error = np.nanmedian(finite_ones, axis=0)
             number = families.index(name.removesuffix("-defaults"))
-            look = {
-                "marker": ENTRY_MARKS[number % len(ENTRY_MARKS)],
-                "color": ENTRY_COLOURS[number % len(ENTRY_COLOURS)],
-                "ms": 5.5,
-                "lw": 1,
-            }
+            mark, colour = (of[number % len(of)] for of in (ENTRY_MARKS, ENTRY_COLOURS))
+            look = {"marker": mark, "color": colour, "ms": 5.5, "lw": 1}
             look |= {"mfc": "white", "ls": ":"} if name.endswith("-defaults") else {}
             axes.plot(cost, np.maximum(error, LEAST), label=name, **look)
             for at in zip(cost, error, strict=True) if len(shown) <= FEW else ():
                 place = at[0], max(at[1], LEAST)
-                axes.annotate(
-                    f"{at[1]:.1e}", place, xytext=(6, 3), textcoords="offset points", fontsize=8
-                )
+                beside: dict[str, Any] = {"xytext": (6, 3), "textcoords": "offset points"}
+                axes.annotate(f"{at[1]:.1e}", place, **beside, fontsize=8)
         axes.axhline(TOLERANCE, color="0.5", lw=0.8)
         axes.set(xscale="log", yscale="log", title=each)
         axes.grid(alpha=0.3)

@@ -159,14 +159,11 @@ class EngineProcess:
         # Not by `multiprocessing`, which runs a person's script a second time unless that is
         # guarded.
         self._pipe, far = multiprocessing.Pipe()
+        serve = f"from {__name__} import serve_engine; serve_engine"
+        paths = [path or str(Path.cwd()) for path in sys.path]
         self._process = subprocess.Popen(
-            [
-                sys.executable,
-                "-c",
-                f"from {__name__} import serve_engine; serve_engine({far.fileno()})",
-            ],
-            env=os.environ
-            | {"PYTHONPATH": os.pathsep.join(path or str(Path.cwd()) for path in sys.path)},
+            [sys.executable, "-c", f"{serve}({far.fileno()})"],
+            env=os.environ | {"PYTHONPATH": os.pathsep.join(paths)},
             pass_fds=[far.fileno()],
             stdin=subprocess.PIPE,  # ends when we do
             stdout=subprocess.DEVNULL,  # engines are talkative
@@ -205,10 +202,8 @@ class EngineProcess:
         if about.missing:
             return replace(found, skipped=about.missing)
         if lacking := ", ".join(need for need in case.needs if need not in about.features):
-            return replace(
-                found,
-                skipped=f"{about.name} doesn't say in FEATURES that it can do this: {lacking}",
-            )
+            why = f"{about.name} doesn't say in FEATURES that it can do this: {lacking}"
+            return replace(found, skipped=why)
         runs: list[tuple[Array | None, float, str]] = []
         chosen = tuple(sorted(steps or about.steps, reverse=True))
         for step in chosen:
@@ -218,9 +213,8 @@ class EngineProcess:
             self._pipe.send((case, step))
             answer = self._answer(self._limit)
             if isinstance(answer, str):  # it hung or died
-                runs += [(None, math.nan, f"{answer} at a step of {1e3 * step:g} ms")] * (
-                    len(chosen) - len(runs)
-                )
+                lost = (None, math.nan, f"{answer} at a step of {1e3 * step:g} ms")
+                runs += [lost] * (len(chosen) - len(runs))
                 break
             if isinstance(answer, NotImplementedError):
                 return replace(found, skipped=str(answer))
@@ -229,20 +223,18 @@ class EngineProcess:
         found = replace(found, steps=chosen, costs=costs, failure=next(filter(None, failures), ""))
         if found.failure and "known to work" in about.version:
             found = replace(found, failure=f"{found.failure} ({about.version})")
-        found = replace(
-            found, errors=tuple(math.nan if s is None else case.error(s) for s in states)
-        )
+        errors = tuple(math.nan if each is None else case.error(each) for each in states)
+        found = replace(found, errors=errors)
         if (last := states[-1]) is None:
             return found
         gaps, slips = case.touching(last)
         sticks, touches = case.in_contact("R"), case.in_contact("RS")
-        return replace(
-            found,
-            creep=float(slips[sticks].mean()) if sticks.any() else math.nan,
-            lost=float((gaps[touches] > LIFTED * min(case.body.size)).mean())
-            if touches.any()
-            else math.nan,
-        )
+        if sticks.any():
+            found = replace(found, creep=float(slips[sticks].mean()))
+        if touches.any():
+            lifted = gaps[touches] > LIFTED * min(case.body.size)
+            found = replace(found, lost=float(lifted.mean()))
+        return found
 
 
 def _load(given: Any) -> tuple[Any, About]:

@@ -36,19 +36,18 @@ def _hopping_orbit(p: Parameters) -> orbits.Orbit | None:
     if p == SET:
         return orbits.refine(p, (6.37e-3, 0.0, 57.3, -106.2, 0.0, 0.0), 0.222)
     found = (each.limit.orbit for each in analytic.attractors(p, STARTS, seed=0))
-    return next(
-        (o for o in found if o and {case.A is Contact.N for case in o.cases} == {True, False}), None
-    )
+    for orbit in found:
+        if orbit and len({case.A is Contact.N for case in orbit.cases}) == 2:
+            return orbit
+    return None
 
 
 def _orbit_or_gap(p: Parameters) -> orbits.Orbit:
     """The orbit of a ball that hops for ever; `GapError` if none is found."""
     if orbit := _hopping_orbit(p):
         return orbit
-    raise GapError(
-        f"no ball hops for ever that starts in one of {STARTS} random states at ω₀ = {p.omega_0:g} "
-        f"rad/s"
-    )
+    tried = f"one of {STARTS} random states at ω₀ = {p.omega_0:g} rad/s"
+    raise GapError(f"no ball hops for ever that starts in {tried}")
 
 
 def draw_branch(of: Diagram) -> tuple[Figure, str]:
@@ -73,32 +72,23 @@ def draw_branch(of: Diagram) -> tuple[Figure, str]:
             height = float(quantity(end.slip_x, end.omega_c))
             style.beside(axes, fast.omega_0, height, text, slips, style.COLOURS[Case.SS])
         slip_x, flows = round_with_fluid(p, Case.NR, edge, top)
-        style.curve(
-            axes, (Case.SR, Case.NR), flows, quantity(slip_x, flows), ("SR, NR", (0.6, rides))
-        )
+        name = "SR, NR", (0.6, rides)
+        style.curve(axes, (Case.SR, Case.NR), flows, quantity(slip_x, flows), name)
         slip_x, flows = round_with_fluid(p, Case.NS, LOWEST_FLOW * edge, (1 - 1e-9) * edge)
         style.curve(axes, Case.NS, flows, quantity(slip_x, flows), ("NS", (0.5, (-3, 9))))
         cycles = [quantity(each.cycle.slip_x, each.cycle.omega_c) for each in branch.orbits]
         mean = quantity(means.slip_x, means.omega_c)
         low, high = [c.min() for c in cycles], [c.max() for c in cycles]
-        axes.fill_between(branch.values, low, high, color=style.HOPPING, alpha=0.25, lw=0)
+        purple = style.HOPPING
+        axes.fill_between(branch.values, low, high, color=purple, alpha=0.25, lw=0)
         for part, line in ((branch.stable, style.STABLE), (~branch.stable, style.UNSTABLE)):
-            axes.plot(
-                branch.values, np.where(part, mean, np.nan), color=style.HOPPING, ls=line, lw=2
-            )
-        style.beside(
-            axes, float(branch.values[-2]), float(mean[-2]), "hopping", hops, style.HOPPING
-        )
+            axes.plot(branch.values, np.where(part, mean, np.nan), color=purple, ls=line, lw=2)
+        style.beside(axes, float(branch.values[-2]), float(mean[-2]), "hopping", hops, purple)
         for special in branch.places:
             if special.kind is Bifurcation.BIRTH:
                 born = State(*special.orbit.mean)
-                style.mark(
-                    axes,
-                    special.value,
-                    float(quantity(born.slip_x, born.omega_c)),
-                    "birth",
-                    (-10, -30),
-                )
+                height = float(quantity(born.slip_x, born.omega_c))
+                style.mark(axes, special.value, height, "birth", (-10, -30))
         axes.set(xlim=(LOWEST_FLOW * edge, top), xlabel=style.OMEGA_0)
         style.guides(axes, {"omega_02": edge})
     orbit.set(ylabel=style.OMEGA_C, ylim=(0, 1.05 * top))
@@ -161,15 +151,10 @@ def draw_basins(basins: Basins) -> Figure:
 
 def fill_basins(axes: Axes, basins: Basins) -> None:
     """Draw the map of basins by theory, and a point for each run of MuJoCo."""
-    look: dict[str, Any] = {
-        "cmap": ListedColormap(_SHADES),
-        "vmin": -0.5,
-        "vmax": len(ATTRACTORS) - 0.5,
-        "alpha": 0.55,
-    }
-    axes.pcolormesh(
-        basins.x, basins.y, basins.attractors, shading="nearest", rasterized=True, **look
-    )
+    shades, most = ListedColormap(_SHADES), len(ATTRACTORS) - 0.5
+    look: dict[str, Any] = {"cmap": shades, "vmin": -0.5, "vmax": most, "alpha": 0.55}
+    look |= {"shading": "nearest", "rasterized": True}
+    axes.pcolormesh(basins.x, basins.y, basins.attractors, **look)
     present = set(np.unique(basins.attractors)) | set(np.unique(basins.mujoco))
     handles: list[object] = [
         Patch(color=_SHADES[k], alpha=0.55, label=ATTRACTORS[k]) for k in sorted(present)
@@ -183,37 +168,17 @@ def fill_basins(axes: Axes, basins: Basins) -> None:
         if np.any(differ):
             handles += axes.plot(x[differ], y[differ], "kx", ms=9, mew=1.3, label="MuJoCo differs")
         handles += axes.plot([], [], "o", ms=4, color="white", mec="k", mew=0.6, label="MuJoCo")
-    axes.set(
-        xlabel=f"{_VARIABLES[basins.across]} at the start",
-        ylabel=f"{_VARIABLES[basins.up]} at the start",
-    )
-    axes.legend(
-        handles=handles,
-        fontsize=8,
-        loc="lower center",
-        bbox_to_anchor=(0.5, 1.0),
-        ncols=len(handles),
-        frameon=False,
-    )
+    across, up = (f"{_VARIABLES[name]} at the start" for name in (basins.across, basins.up))
+    axes.set(xlabel=across, ylabel=up)
+    above: dict[str, Any] = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "frameon": False}
+    axes.legend(handles=handles, fontsize=8, ncols=len(handles), **above)
 
 
+_HOPS = methodcaller("select", "orbit_omega_c", "period")
 FIGURES = {
-    name: diagram(
-        name,
-        f"Beyond the paper: {title}",
-        "hopping",
-        draw,
-        (claim,),
-        methodcaller("select", quantity, "period"),
-    )
-    for name, title, quantity, draw, claim in (
-        ("hopping-orbit", "a ball that hops for ever", "orbit_omega_c", draw_orbit, "hopping"),
-        (
-            "hopping-branch",
-            "Figs. 9, 10 and 13 with hopping",
-            "orbit_omega_c",
-            draw_branch,
-            "hopping-birth",
-        ),
+    name: diagram(name, f"Beyond the paper: {title}", "hopping", draw, (claim,), _HOPS)
+    for name, title, draw, claim in (
+        ("hopping-orbit", "a ball that hops for ever", draw_orbit, "hopping"),
+        ("hopping-branch", "Figs. 9, 10 and 13 with hopping", draw_branch, "hopping-birth"),
     )
 }

@@ -28,13 +28,9 @@ _WAYS = {"up": ("^", ", flow raised"), "down": ("v", ", flow lowered")}
 
 def select_curves(evidence: Evidence) -> tuple[Diagram, ...]:
     """The settled states of every engine with two sets, without balls that only sink."""
-    settled = [
-        m
-        for m in evidence.select("omega_c", "case")
-        if m.protocol in ("settled", "hysteresis")
-        and m.parameters.omega_0 > 0
-        and m.at["case"] != "NS"
-    ]
+    measured = (m for m in evidence.select("omega_c", "case") if m.parameters.omega_0 > 0)
+    protocols = ("settled", "hysteresis")
+    settled = [m for m in measured if m.protocol in protocols and m.at["case"] != "NS"]
     curves = tuple(
         Diagram(figure, Parameters.named(name), tuple(m for m in settled if m.set == name))
         for figure, name in SETS.items()
@@ -58,9 +54,8 @@ def draw_curves(curves: tuple[Diagram, ...]) -> tuple[Figure, str]:
         theory(above, p, fastest)
         above.set_title(f"η = {p.eta:g} {'<' if p.eta < p.j else '>'} j = {p.j:g}", fontsize=11)
         style.points(above, curve.states)
-        above.set(
-            ylim=(0, 1.05 * max([fastest, *(m.value for m in curve.states)])), ylabel=style.OMEGA_C
-        )
+        highest = max([fastest, *(m.value for m in curve.states)])
+        above.set(ylim=(0, 1.05 * highest), ylabel=style.OMEGA_C)
         style.legend(above, loc="upper left", frameon=False)
         style.dimensionless(above, p, style.FREE_0)
         above.grid(alpha=0.25)
@@ -68,10 +63,8 @@ def draw_curves(curves: tuple[Diagram, ...]) -> tuple[Figure, str]:
         below.set(xlabel=style.OMEGA_0)
     for above in panels[0]:
         names_within(above)
-    sets = "; ".join(
-        f"{side}: {style.named(curve.p)}"
-        for side, curve in zip(("left", "right"), curves, strict=True)
-    )
+    sides = zip(("left", "right"), curves, strict=True)
+    sets = "; ".join(f"{side}: {style.named(curve.p)}" for side, curve in sides)
     states = [m for curve in curves for m in curve.states]
     return figure, (
         f"Angular velocity ω_c of the ball's orbit against that of the fluid, ω₀; {sets}. Lines: "
@@ -96,12 +89,8 @@ def draw_figure_13(of: Diagram) -> tuple[Figure, str]:
         )
         _jumps(axes, p, t)
         for side, (mark, text) in _WAYS.items():
-            style.points(
-                axes,
-                [m for m in of.states if m.at.get("side") == side],
-                way=text,
-                marker=mark,
-            )
+            own = [m for m in of.states if m.at.get("side") == side]
+            style.points(axes, own, way=text, marker=mark)
         style.points(axes, [m for m in of.states if m.protocol == "edge"], way=", edge", ms=3.5)
     else:
         said = (
@@ -115,20 +104,16 @@ def draw_figure_13(of: Diagram) -> tuple[Figure, str]:
     style.legend(axes, loc="upper left")
     style.dimensionless(axes, p, style.FREE_0, style.FREE_C)
     names_within(axes)
-    return figure, style.caption(
-        p, "Characteristic curve of the flowmeter.", said, states=of.states
-    )
+    said = f"Characteristic curve of the flowmeter. {said}"
+    return figure, style.caption(p, said, states=of.states)
 
 
 def _jumps(axes: Axes, p: Parameters, t: bifurcation.Thresholds) -> None:
     """Draw as arrows where the reading jumps while the flow rises, and while it falls."""
     slow = analytic.solution(p.replace(omega_0=t.omega_02 * (1 + 1e-9)), Case.SS)
     look = {"arrowstyle": "-|>", "color": "black", "lw": 1.2, "shrinkA": 2, "shrinkB": 2}
-    jumps = (
-        (t.omega_04, fold_state(p).omega_c, t.omega_04),
-        (t.omega_02, t.omega_02, slow.state.omega_c),
-    )
-    for x, begin, end in jumps:
+    up = t.omega_04, fold_state(p).omega_c, t.omega_04
+    for x, begin, end in (up, (t.omega_02, t.omega_02, slow.state.omega_c)):
         axes.annotate("", (x, float(end)), (x, float(begin)), arrowprops=look)
 
 
@@ -179,13 +164,11 @@ def theory(axes: Axes, p: Parameters, fastest: float) -> bifurcation.Thresholds:
     else:
         spans.append(((Case.RR, Case.NR), (t.omega_02, rolls), 0.5))
     for cases, span, at in spans:
-        style.curve(
-            axes, cases, span, span, (", ".join(case.name for case in cases), (at, (-5, 5)))
-        )
+        name = ", ".join(case.name for case in cases)
+        style.curve(axes, cases, span, span, (name, (at, (-5, 5))))
     axes.set_xlim(0, fastest)
-    style.guides(
-        axes, {f"omega_0{k}": getattr(t, f"omega_0{k}") for k in ((1, 2, 4) if folds else (2, 3))}
-    )
+    shown = [f"omega_0{k}" for k in ((1, 2, 4) if folds else (2, 3))]
+    style.guides(axes, {name: getattr(t, name) for name in shown})
     return t
 
 
@@ -196,10 +179,8 @@ def names_within(axes: Axes) -> None:
         low, high = axes.get_window_extent().get_points()
         for name in axes.findobj(Annotation):
             begin, end = name.get_window_extent().get_points()
-            name.xyann = (
-                name.xyann
-                + (np.maximum(low - begin, 0) - np.maximum(end - high, 0)) * 72 / figure.dpi
-            )
+            inwards = np.maximum(low - begin, 0) - np.maximum(end - high, 0)
+            name.xyann = name.xyann + inwards * 72 / figure.dpi
 
 
 def draw_fall(of: Diagram) -> tuple[Figure, str]:
@@ -210,14 +191,10 @@ def draw_fall(of: Diagram) -> tuple[Figure, str]:
     only_where(of.p, folds=False)
     check_thresholds(of.p)
     run = of.motions[-1].load() if of.motions else simulator.unloading(of.p, 5.0)
-    landings = [
-        t
-        for t, to in zip(run.events.time, run.events.to_case, strict=True)
-        if Case(to).A is not Contact.N
-    ]
-    if not landings:
+    on_floor = np.array([Case(to).A is not Contact.N for to in run.events.to_case], bool)
+    if not on_floor.any():
         raise GapError("the ball never landed")
-    lands = landings[0]
+    lands = run.events.time[on_floor][0]
     leaves = run.events.time[(run.events.from_case == Case.NR) & (run.events.time <= lands)]
     left = leaves[-1] if len(leaves) else run.time[0]
     figure, panels = style.panels(9, 6, 3, 2, sharex="col", width_ratios=[1.7, 1])
@@ -234,9 +211,8 @@ def draw_fall(of: Diagram) -> tuple[Figure, str]:
         k = k[:: max(1, len(k) // 1500)]
         t = unit * (run.time[k] - origin)
         gaps, speed, slip = column
-        dots: dict[str, Any] = {"color": "black"} | (
-            {} if column is whole else {"marker": ".", "ms": 3}
-        )
+        dots: dict[str, Any] = {"color": "black"}
+        dots |= {} if column is whole else {"marker": ".", "ms": 3}
         gaps.plot(t, size * run.y[k], label="$y$ (floor)", **dots)
         gaps.plot(t, size * run.h[k], color=style.FORCE, ls="--", label="$h$ (wall)")
         if column is whole:
@@ -256,9 +232,8 @@ def draw_fall(of: Diagram) -> tuple[Figure, str]:
             touches = [case for case in Case if getattr(case, point) is not Contact.N]
             shown = np.where(np.isin(run.case[k], touches), value[k], np.nan)
             slip.plot(t, shown, ls=line, label=f"$|v_{point}|$", **dots)
-        slip.set(
-            ylabel="slip speed (m/s)", xlim=(unit * (span[0] - origin), unit * (span[1] - origin))
-        )
+        begin, end = (unit * (time - origin) for time in span)
+        slip.set(ylabel="slip speed (m/s)", xlim=(begin, end))
         for axes in column:
             style.ground(axes, run, span, unit, origin, named=axes is gaps)
             axes.axvline(unit * (lands - origin), color="0.3", lw=0.8)
@@ -300,10 +275,6 @@ FIGURES = {"characteristic": Drawing("Characteristic curves", select_curves, dra
 }
 
 
-# --- a designed meter, on its page
-# ------------------------------------------------------------------------------
-
-
 def draw_readings(made: Design) -> tuple[Figure, str]:
     """A figure of a design: reading over flow, band and limits; and its caption."""
     curve, chosen, request = made.curve, made.choice, made.request
@@ -313,23 +284,12 @@ def draw_readings(made: Design) -> tuple[Figure, str]:
     )
     axes.fill_between(flows, below, above, color="0.82", lw=0, label="within the tolerances")
     axes.plot(flows, low, color=style.COLOURS[Case.SS], lw=2, label="nominal, rising flow")
-    axes.plot(
-        flows, high, color=style.COLOURS[Case.NR], lw=2, ls="--", label="nominal, falling flow"
-    )
-    axes.axvspan(
-        request.slowest,
-        request.fastest,
-        color="#0072B2",
-        alpha=0.12,
-        lw=0,
-        label="flows to measure",
-    )
-    limit: dict[str, Any] = {
-        "color": style.FORCE,
-        "alpha": 0.25,
-        "lw": 1,
-        "label": "limit, from worst to nominal",
-    }
+    falling: dict[str, Any] = {"color": style.COLOURS[Case.NR], "lw": 2, "ls": "--"}
+    axes.plot(flows, high, **falling, label="nominal, falling flow")
+    wanted: dict[str, Any] = {"color": "#0072B2", "alpha": 0.12, "lw": 0}
+    axes.axvspan(request.slowest, request.fastest, **wanted, label="flows to measure")
+    limit: dict[str, Any] = {"color": style.FORCE, "alpha": 0.25, "lw": 1}
+    limit["label"] = "limit, from worst to nominal"
     axes.axvspan(chosen.worst.omega_0, chosen.limit.omega_0, **limit)
     axes.set(xlim=(0, flows[-1]), ylim=(0, None), xlabel=style.OMEGA_0, ylabel=style.OMEGA_C)
     style.guides(axes, {key: getattr(made.thresholds, key) for key in THRESHOLDS})
@@ -346,18 +306,16 @@ def draw_friction(made: Design) -> tuple[Figure, str]:
     chosen = made.choice
     top = {name: max(1.5 * chosen.values[name], 1.25 * chosen.p.j) for name in ("mu", "eta")}
     mu, eta = (np.linspace(top[name] / 50, top[name], 51) for name in ("mu", "eta"))
-    limits = [
-        [analytic.operating_range(chosen.p.replace(mu=float(m), eta=float(e))) for e in eta]
-        for m in mu
-    ]
+    sets = [[chosen.p.replace(mu=float(m), eta=float(e)) for e in eta] for m in mu]
+    limits = [[analytic.operating_range(p) for p in row] for row in sets]
     figure, axes = style.panels(7.0, 4.3)
     shown = axes.contourf(eta, mu, limits, levels=14, cmap="cividis")
     figure.colorbar(shown, label="operating range up to $\\omega_0$ (rad/s)")
     axes.contour(eta, mu, limits, levels=[made.request.fastest], colors="white", linewidths=1.5)
     axes.axvline(chosen.p.j, color="black", lw=1, ls=":")
-    x, y = (chosen.values[name] for name in ("eta", "mu"))
-    xerr, yerr = (
-        made.request.tolerances.get(name, 0.0) * chosen.values[name] for name in ("eta", "mu")
+    (x, xerr), (y, yerr) = (
+        (chosen.values[name], made.request.tolerances.get(name, 0.0) * chosen.values[name])
+        for name in ("eta", "mu")
     )
     axes.errorbar(x, y, yerr, xerr, fmt="o", color="white", mec="black", ms=7, capsize=4)
     axes.set(xlabel="wall friction $\\eta$", ylabel="floor friction $\\mu$")

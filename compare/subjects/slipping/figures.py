@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -40,14 +41,9 @@ def draw(of: Diagram) -> tuple[Figure, str]:
         time.plot(t, slip, color=style.COLOURS[Case.NS], ls=line, label=f"$\\tilde\\omega_{name}$")
     if stops:
         time.axvline(1e3 * end, **style.GUIDE)
+        above: dict[str, Any] = {"ha": "center", "transform": time.get_xaxis_transform()}
         for place, case in ((0.3, Case.NS), (1.3, Case.NR)):
-            time.text(
-                1e3 * place * end,
-                0.93,
-                case.name,
-                ha="center",
-                transform=time.get_xaxis_transform(),
-            )
+            time.text(1e3 * place * end, 0.93, case.name, **above)
     time.set(xlabel="$t$ (ms)", ylabel="slip at the wall (rad/s)")
     time.legend(frameon=False)
     w_y, w_z = run.slip_y, run.slip_z
@@ -55,9 +51,8 @@ def draw(of: Diagram) -> tuple[Figure, str]:
     plane.plot([w_z[0], 0], [w_y[0], 0], **style.GUIDE)
     halfway = int(np.searchsorted(np.hypot(np.diff(w_z), np.diff(w_y)).cumsum(), 0.5 * PUSHED))
     tail, head = zip(w_z[halfway : halfway + 2], w_y[halfway : halfway + 2], strict=True)
-    plane.annotate(
-        "", head, tail, arrowprops={"arrowstyle": "-|>", "color": "black", "mutation_scale": 14}
-    )
+    arrow = {"arrowstyle": "-|>", "color": "black", "mutation_scale": 14}
+    plane.annotate("", head, tail, arrowprops=arrow)
     plane.plot(w_z[0], w_y[0], "kx", ms=7, mew=1.8)
     style.mark(plane, 0.0, 0.0, "NR", (6, -6))
     plane.set(xlabel="$\\tilde\\omega_z$ (rad/s)", ylabel="$\\tilde\\omega_y$ (rad/s)")

@@ -59,25 +59,18 @@ def draw_plane(plane: Diagram) -> tuple[Figure, str]:
     p, equal = plane.p, plane.figure == "fig-8"
     figure = style.figure(6.4, 4.9)
     axes = figure.add_subplot()
-    regions(
-        axes, p, equal, max((c.measurement.parameters.omega_0 for c in plane.checks), default=0.0)
-    )
-    for section, text in (
-        _SECTIONS.items() if not equal and p.replace(eta=_THEORY.eta) == _THEORY else ()
-    ):
+    flows = (c.measurement.parameters.omega_0 for c in plane.checks)
+    regions(axes, p, equal, max(flows, default=0.0))
+    of_paper = not equal and p.replace(eta=_THEORY.eta) == _THEORY
+    for section, text in _SECTIONS.items() if of_paper else ():
         axes.axvline(section, color="0.4", lw=0.7, zorder=1)
         axes.text(section, 0.985, text, rotation=90, ha="right", va="top", fontsize=8, color="0.3",
                   transform=axes.get_xaxis_transform())  # fmt: skip
-    marks = [
-        (f"{engine}, as predicted", own, style.mark_of(engine))
-        for engine, own in style.by_engine(
-            plane.checks, lambda check: check.measurement.engine
-        ).items()
-    ]
+    engines = style.by_engine(plane.checks, lambda check: check.measurement.engine)
+    marks = [(f"{name}, as predicted", own, style.mark_of(name)) for name, own in engines.items()]
     if failed := [check for check in plane.checks if not check.agrees]:
-        marks.append(
-            ("not as predicted", failed, {"marker": "x", "color": "#B3261E", "ms": 10, "mew": 2})
-        )
+        crossed = {"marker": "x", "color": "#B3261E", "ms": 10, "mew": 2}
+        marks.append(("not as predicted", failed, crossed))
     for label, checks, look in marks:
         places = [(c.measurement.parameters.eta, c.measurement.parameters.omega_0) for c in checks]
         axes.plot(*np.transpose(places), ls="none", label=label, **{"ms": 4.5} | look)
@@ -91,9 +84,8 @@ def draw_plane(plane: Diagram) -> tuple[Figure, str]:
     )
     if plane.checks:
         caption += f" Marks: the {len(plane.checks)} points at which runs were started; they ended "
-        caption += (
-            f"not as predicted in {len(failed)} (crossed)." if failed else "as predicted in all."
-        )
+        crossed_out = f"not as predicted in {len(failed)} (crossed)."
+        caption += crossed_out if failed else "as predicted in all."
     return figure, caption
 
 
@@ -103,29 +95,21 @@ def regions(axes: Axes, p: Parameters, equal: bool, highest: float = 0.0) -> Non
     mu = eta if equal else np.full(eta.shape, p.mu)
     # lower ones set no scale
     doubles = [each for each in bifurcation.double_points(p, equal) if each.eta > 0.01]
-    fastest = 1.15 * max(
-        [2.2 * float(np.sqrt(p.g / p.R)), highest, *(point.omega_0 for point in doubles)]
-    )
+    unit = float(np.sqrt(p.g / p.R))
+    fastest = 1.15 * max([2.2 * unit, highest, *(point.omega_0 for point in doubles)])
     omega_0 = np.linspace(0.0, fastest, 901)
     plane = bifurcation.case_map(p, mu, eta, omega_0).T
     kinds = np.unique(plane)
     shades = ListedColormap([TINTS.get(Exists(int(kind)), "#eeeeee") for kind in kinds])
-    grid: dict[str, Any] = {
-        "origin": "lower",
-        "aspect": "auto",
-        "extent": (*eta[[0, -1]], *omega_0[[0, -1]]),
-    }
-    shown = np.searchsorted(kinds, plane)
-    axes.imshow(
-        shown, cmap=shades, vmin=0, vmax=len(kinds) - 1, interpolation="nearest", zorder=0, **grid
-    )
+    shown, extent = np.searchsorted(kinds, plane), (*eta[[0, -1]], *omega_0[[0, -1]])
+    grid: dict[str, Any] = {"origin": "lower", "aspect": "auto", "extent": extent}
+    grid |= {"interpolation": "nearest", "zorder": 0}
+    axes.imshow(shown, cmap=shades, vmin=0, vmax=len(kinds) - 1, **grid)
     both = (plane == _BISTABLE).astype(float)
     if both.any():
-        hatched = axes.contourf(
-            eta, omega_0, both, levels=[0.5, 1.5], colors="none", hatches=["////"], zorder=0.2
-        )
+        lines: dict[str, Any] = {"colors": "none", "hatches": ["////"], "zorder": 0.2}
+        hatched = axes.contourf(eta, omega_0, both, levels=[0.5, 1.5], **lines)
         hatched.set(edgecolor="0.75", linewidth=0)
-    unit = np.sqrt(p.g / p.R)
     for name, curve in bifurcation.threshold_curves(p, mu, eta).items():
         if name in style.THRESHOLD_LINES:
             colour, line = style.THRESHOLD_LINES[name]
@@ -147,14 +131,9 @@ def _name(axes: Axes, where: npt.NDArray[np.bool_], eta: Array, omega_0: Array, 
     """Write the cases at the widest spot of every region with room for them.
 
     The region with two stable motions is narrow: its name stands at the top, with a line."""
-    names = [
-        flag.name.replace("SS_BEYOND_FOLD", "SS*") for flag in Exists if flag & kind and flag.name
-    ]
-    text = (
-        "\n".join(["  ".join(names[:2]), "  ".join(names[2:])])
-        if len(names) > 2
-        else "  ".join(names)
-    )
+    flags = (flag.name for flag in Exists if flag & kind and flag.name)
+    names = [name.replace("SS_BEYOND_FOLD", "SS*") for name in flags]
+    text = "\n".join("  ".join(row) for row in (names[:2], names[2:]) if row)
     regions, count = ndimage.label(where)
     near = np.any([np.abs(eta - section) < 0.035 for section in _SECTIONS], axis=0)
     for k, box in zip(range(1, count + 1), ndimage.find_objects(regions), strict=True):
@@ -164,21 +143,15 @@ def _name(axes: Axes, where: npt.NDArray[np.bool_], eta: Array, omega_0: Array, 
         room = np.where(near[box[1]][None, :], room / 4, room)
         row, column = np.unravel_index(np.argmax(room), room.shape)
         here = float(eta[box[1]][column]), float(omega_0[box[0]][row])
-        if room[row, column] > 7 and kind == _BISTABLE:
-            look: dict[str, Any] = {
-                "bbox": style.HALO,
-                "arrowprops": {"arrowstyle": "-", "lw": 0.7, "color": "0.4"},
-            }
-            at: dict[str, Any] = {
-                "xytext": (0.31, 0.97),
-                "textcoords": "axes fraction",
-                "va": "top",
-            }
-            axes.annotate(f"{text}\nbistable", here, **at, **look, fontsize=9, zorder=6)
-        elif room[row, column] > 7:
-            style.beside(
-                axes, *here, text, (-15, 45) if "\n" in text and room[row, column] < 60 else (0, 0)
-            )
+        if room[row, column] <= 7:
+            continue
+        if kind == _BISTABLE:
+            at: dict[str, Any] = {"textcoords": "axes fraction", "va": "top", "zorder": 6}
+            look = style.NAME | at | {"arrowprops": {"arrowstyle": "-", "lw": 0.7, "color": "0.4"}}
+            axes.annotate(f"{text}\nbistable", here, (0.31, 0.97), **look)
+        else:
+            narrow = "\n" in text and room[row, column] < 60
+            style.beside(axes, *here, text, (-15, 45) if narrow else (0, 0))
 
 
 RELEASED = _THEORY.replace(eta=0.43)
@@ -204,9 +177,8 @@ def draw_diagram(of: Diagram) -> tuple[Figure, str]:
     check_thresholds(p)
     axes, t = figure.add_subplot(), bifurcation.thresholds(p)
     guides, flows = _draw_branches(axes, p, of.figure)
-    axes.set(
-        xlim=flows, ylim=(0, 1.12 * axes.get_ylim()[1]), xlabel=style.OMEGA_0, ylabel=style.OMEGA_X
-    )
+    axes.set(xlim=flows, ylim=(0, 1.12 * axes.get_ylim()[1]))
+    axes.set(xlabel=style.OMEGA_0, ylabel=style.OMEGA_X)
     if of.figure == "fig-12":
         axes.set_ylim(0.75 * t.omega_03 * p.R / p.r, 1.15 * guides["omega_01"] * p.R / p.r)
     style.points(axes, of.states)
@@ -259,10 +231,8 @@ def _draw_branches(
             axes.plot([w], [spin_of(Case.NR, w, p)], **style.POINT)
         return {"omega_02": t.omega_02, "omega_03": t.omega_03}, (0.0, 1.6 * t.omega_03)
     if not np.isfinite(slipping_branch.states(np.linspace(-16.0, 16.0, 99), p)[1]).all():
-        raise GapError(
-            f"with (12) released its branch of SS isn't whole: that needs an η nearer to j than "
-            f"{p.eta:g}"
-        )
+        why = "with (12) released its branch of SS isn't whole: that needs an η nearer to j"
+        raise GapError(f"{why} than {p.eta:g}")
     curves = bifurcation.threshold_curves(p, p.mu, p.eta, released=True)
     guides |= {name: float(curves[name] * np.sqrt(p.g / p.R)) for name in ("omega_01", "omega_04")}
     omega_01, omega_04 = guides["omega_01"], guides["omega_04"]
@@ -311,10 +281,7 @@ FIGURES |= {
         ("fig-11", "Fig. 11: on the floor, η > j", "high-wall-friction", ("RR", "SR", "NR")),
     )
 }
+_TITLE = "Fig. 12: on the floor, η > j, (12) released"
 FIGURES["fig-12"] = Drawing(
-    "Fig. 12: on the floor, η > j, (12) released",
-    _select_released,
-    draw_diagram,
-    (),
-    partial(Diagram, "fig-12"),
+    _TITLE, _select_released, draw_diagram, of_set=partial(Diagram, "fig-12")
 )

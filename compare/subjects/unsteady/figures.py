@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from functools import cache, partial
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -52,11 +53,8 @@ def _theory(p: Parameters) -> tuple[list[float], list[float], list[float]]:
     fastest = 0.86 * math.sqrt(p.g / p.R)
     f = np.geomspace(max(0.04 * p.c, fastest / 3e3), fastest, FREQUENCIES).tolist()
     onsets = [pulsation.slip_onset(p, each) for each in f]
-    return (
-        f,
-        onsets,
-        [pulsation.mean_error(p, 1.5 * a, each) for each, a in zip(f, onsets, strict=True)],
-    )
+    beyond = zip(f, onsets, strict=True)
+    return f, onsets, [pulsation.mean_error(p, 1.5 * onset, each) for each, onset in beyond]
 
 
 def draw_pulsation(of: Diagram) -> tuple[Figure, str]:
@@ -75,11 +73,8 @@ def draw_pulsation(of: Diagram) -> tuple[Figure, str]:
         k = 330 if case is Case.RR else 60
         style.beside(gain, f[k], abs(ratio[k]), case.name, (0, -8), style.COLOURS[case])
     style.curve(onset, Case.RR, frequencies, onsets)
-    limits = (
-        (pulsation.slow_onset(p), "slow", f[225], 3),
-        (pulsation.fast_onset(p), "fast", f[75], -3),
-    )
-    for limit, way, at, shift in limits:
+    slow, fast = pulsation.slow_onset(p), pulsation.fast_onset(p)
+    for limit, way, at, shift in (slow, "slow", f[225], 3), (fast, "fast", f[75], -3):
         onset.axhline(limit, **style.GUIDE)
         style.beside(onset, at, limit, f"limit of {way} pulsations", (0, shift))
     error.plot(frequencies, errors, ".-", color=style.COLOURS[Case.SS], lw=1.5, ms=5)
@@ -95,11 +90,9 @@ def draw_pulsation(of: Diagram) -> tuple[Figure, str]:
     onset.margins(y=0.12)
     error.set(ylabel="mean of $\\omega_c - \\omega_0$ (rad/s)", xlabel="frequency (Hz)")
     style.legend(gain, loc="lower left")
-    both = (
-        f", and where it slips at both (SS, ω₀ = {cases[Case.SS].omega_0:.3g} rad/s)"
-        if Case.SS in cases
-        else ""
-    )
+    both = ""
+    if Case.SS in cases:
+        both = f", and where it slips at both (SS, ω₀ = {cases[Case.SS].omega_0:.3g} rad/s)"
     return figure, style.caption(
         p,
         f"A ball in a flow that pulsates about ω₀ = {p.omega_0:.4g} rad/s. Left: gain and phase "
@@ -116,25 +109,14 @@ def draw_unsteady(of: Diagram) -> tuple[Figure, str]:
     check_thresholds(of.p)
     figure, (jump, ramp, law) = style.panels(10.0, 3.6, 1, 3)
     t = np.linspace(0.0, min(_LASTS[0] / of.p.c, _LASTS[1] * math.sqrt(of.p.R / of.p.g)), 800)
-    jump.plot(
-        t,
-        response.step_response(_rolling(of), Case.RR, t),
-        color=style.COLOURS[Case.RR],
-        lw=2,
-        label="RR",
-    )
+    rolls = response.step_response(_rolling(of), Case.RR, t)
+    jump.plot(t, rolls, color=style.COLOURS[Case.RR], lw=2, label="RR")
+    slips: dict[str, Any] = {"color": style.COLOURS[Case.SS], "lw": 1.8}
     flows = [_slipping(of.p, share) for share in SHARES]
     flows[0] = next((m.parameters for m in of.states if m.quantity == "jump_height"), flows[0])
     for p, shade in zip(flows, (0.4, 0.7, 1.0), strict=True):
         y = response.step_response(p, Case.SS, t) / response.transfer(p, Case.SS, 0.0).real
-        jump.plot(
-            t,
-            y,
-            color=style.COLOURS[Case.SS],
-            alpha=shade,
-            lw=1.8,
-            label=f"SS, {p.omega_0:.3g} rad/s",
-        )
+        jump.plot(t, y, **slips, alpha=shade, label=f"SS, {p.omega_0:.3g} rad/s")
     if of.motions:
         up, down = (motion.load() for motion in of.motions[-2:])  # with the finer step
         shown = np.flatnonzero(up.time <= t[-1])[::5]
@@ -154,30 +136,15 @@ def draw_unsteady(of: Diagram) -> tuple[Figure, str]:
         flow = Flow.ramp(p.omega_0, last, lasts)
         run = analytic.simulate(p, start.x, lasts, flow, sample_interval=lasts / 5000, rtol=1e-6)
         passed.append(caught_up(run) - fold)
-        ramp.plot(
-            flow(run.time),
-            run.omega_c,
-            "k",
-            alpha=shade,
-            lw=1.5,
-            label=f"rising by {rate:.2g} rad/s²",
-        )
+        name = f"rising by {rate:.2g} rad/s²"
+        ramp.plot(flow(run.time), run.omega_c, "k", alpha=shade, lw=1.5, label=name)
     beyond = np.array([p.omega_0, last])
     style.curve(ramp, Case.NR, beyond, beyond, ("NR", (0.9, (-5, 5))))
-    ramp.set(
-        xlim=beyond,
-        ylim=(0.7 * start.state.omega_c, 1.1 * last),
-        xlabel=style.OMEGA_0,
-        ylabel=style.OMEGA_C,
-    )
+    ramp.set(xlim=beyond, ylim=(0.7 * start.state.omega_c, 1.1 * last))
+    ramp.set(xlabel=style.OMEGA_0, ylabel=style.OMEGA_C)
     style.guides(ramp, {"omega_04": fold})
-    law.loglog(
-        rates,
-        response.ramp_coefficient(of.p) * rates ** (2 / 3),
-        color="0.4",
-        ls="--",
-        label="slow ramps",
-    )
+    slow = response.ramp_coefficient(of.p) * rates ** (2 / 3)
+    law.loglog(rates, slow, color="0.4", ls="--", label="slow ramps")
     law.plot(rates, passed, color=style.COLOURS[Case.SS], lw=2, label="simulated")
     style.points(law, measured, lambda m: m.at["rate"], lambda m: m.value - fold)
     law.set(xlabel="rate ρ of the ramp (rad/s²)", ylabel="flow beyond $\\omega_{04}$ (rad/s)")
@@ -187,9 +154,9 @@ def draw_unsteady(of: Diagram) -> tuple[Figure, str]:
         axis.set_minor_formatter(NullFormatter())
     for axes in (ramp, law):
         style.legend(axes, loc="upper left")
-    dots = (
-        " Dots: mujoco, half the difference of two small jumps, up and down." if of.motions else ""
-    )
+    dots = ""
+    if of.motions:
+        dots = " Dots: mujoco, half the difference of two small jumps, up and down."
     return figure, style.caption(
         of.p,
         "Left: ω_c after a small jump of the flow, divided by its final change; a ball that rolls "
@@ -206,17 +173,12 @@ def _measured(protocol: str, evidence: Evidence) -> Iterator[Measurement]:
     return evidence.records.select(protocol)
 
 
+_PULSATION = "pulsation-lag", "pulsation-slip", "pulsation-mean"
+_JUMPS = "jump-slipping", "ramp-fold"
 FIGURES = {
-    name: diagram(
-        name, f"Unsteady flow: {title}", "reference", draw, claims, partial(_measured, name)
-    )
+    name: diagram(name, title, "reference", draw, claims, partial(_measured, name))
     for name, title, draw, claims in (
-        (
-            "pulsation",
-            "pulsation",
-            draw_pulsation,
-            ("pulsation-lag", "pulsation-slip", "pulsation-mean"),
-        ),
-        ("unsteady", "jumps and ramps", draw_unsteady, ("jump-slipping", "ramp-fold")),
+        ("pulsation", "Unsteady flow: pulsation", draw_pulsation, _PULSATION),
+        ("unsteady", "Unsteady flow: jumps and ramps", draw_unsteady, _JUMPS),
     )
 }
