@@ -132,9 +132,9 @@ class Lawful(Bodies):
         )
 
 
-def pairs(spec: Any, scene: Scene) -> Iterator[tuple[str, Any]]:
-    """Add a contact pair, with the surface's friction, for each surface and what touches it, where
-    there is none; yield name and pair."""
+def pairs(spec: Any, scene: Scene) -> Iterator[Any]:
+    """Contact pairs of each surface and what touches it; where there is none, one is added with the
+    surface's friction."""
     lowest = "under" if scene.under else "body"
     there = {(pair.geomname1, pair.geomname2): pair for pair in spec.pairs}
     for surface in scene.surfaces:
@@ -146,7 +146,7 @@ def pairs(spec: Any, scene: Scene) -> Iterator[tuple[str, Any]]:
             if not (pair := there.get((geom, part))):
                 pair = spec.add_pair(geomname1=geom, geomname2=part, condim=3)
                 pair.friction = (surface.friction, surface.friction, 0.0, 0.0, 0.0)
-            yield surface.name, pair
+            yield pair
 
 
 def studied(spec: Any, scene: Scene, timestep: float) -> None:
@@ -156,7 +156,7 @@ def studied(spec: Any, scene: Scene, timestep: float) -> None:
     micrometres a second."""
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     spec.option.impratio, spec.option.tolerance = 1e4, 1e-12
-    for _, pair in pairs(spec, scene):
+    for pair in pairs(spec, scene):
         pair.solref, pair.solreffriction = (6 * timestep, 1.0), (100 * timestep, 1.0)
         pair.solimp = (0.2, 0.2, 1e-4, 0.5, 2.0)
 

@@ -6,6 +6,7 @@ nothing of its own: the coefficient of a pair is that of the surface."""
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -165,81 +166,75 @@ class Scene:
                 yield surface, surface.name, np.array(surface.point), np.array(surface.normal)
             else:
                 for k in range(facets):
-                    yield (
-                        surface,
-                        f"{surface.name}{k}",
-                        *tangent(surface.radius, math.tau * k / facets),
-                    )
+                    plane = tangent(surface.radius, math.tau * k / facets)
+                    yield surface, f"{surface.name}{k}", *plane
 
     def mjcf(self, timestep: float = 1e-3) -> str:
         """The scene for MuJoCo, as it comes; it lacks `force` and restitution."""
-        parts: list[str] = []
-        qpos: list[float] = []
-        qvel: list[float] = []
-        for surface, name, point, normal in self.planes(FACETS):
-            moves = (
-                *in_body_axes(upright(normal), np.array(surface.velocity)),
-                0.0,
-                0.0,
-                surface.turning,
-            )
-            pose = f'pos="{_text(point)}" quat="{_text(upright(normal))}"'
-            belt = f'surfacevel="{_text(moves)}" ' if any(moves) else ""
-            parts.append(
-                f'<geom name="{name}" type="plane" size="0 0 1" {pose} '
-                f'{belt}friction="{surface.friction} 0 0"/>'
-            )
-        for name, body in reversed([*zip(("body", "under"), self.bodies, strict=False)]):
-            joint = (
-                f'<joint type="slide" axis="{_text(self.joint)}" frictionloss="{self.dry}"/>'
-                if self.joint
-                else ""
-            )
-            shape = {"tripod": "sphere", "disc": "cylinder"}.get(body.shape, body.shape)
-            size = body.size[:1] if body.shape == "tripod" else body.size
-            geoms = [
-                f'<geom name="{name}{k or ""}" type="{shape}" size="{_text(size)}" '
-                f'pos="{_text(at)}" friction="0 0 0"/>'
-                for k, at in enumerate(body.parts)
-            ]
-            at = f'pos="{_text(body.position)}" quat="{_text(body.orientation)}"'
-            parts.append(f"""<body name="{name}" {at}>
-      {joint or "<freejoint/>"}
-      <inertial pos="0 0 0" mass="{body.mass}" diaginertia="{_text(body.inertia)}"/>
-      {(chr(10) + "      ").join(geoms)}
-    </body>""")
-            # MuJoCo counts the spin of a free body in its own axes.
-            free = (
-                [*body.position, *body.orientation],
-                [*body.velocity, *in_body_axes(body.orientation, body.spin)],
-            )
-            start = ([0.0], [float(np.dot(self.joint, body.velocity))]) if self.joint else free
-            qpos, qvel = qpos + start[0], qvel + start[1]
-        frictions = [("under", "body", self.between, self.between)] if self.under else []
-        # The engine's first direction on a level plane is y, its second one x.
-        frictions += [
-            (
-                surface.name,
-                ("body", "under")[len(self.bodies) - 1],
-                surface.across,
-                surface.friction,
-            )
-            for surface in self.surfaces
-            if surface.across
-        ]
-        pairs = "".join(
-            f'<pair geom1="{one}" geom2="{other}" friction="{first} {second} 0 0 0"/>'
-            for one, other, first, second in frictions
-        )
+        named = reversed([*zip(("body", "under"), self.bodies, strict=False)])
+        bodies, starts = zip(*(self._body_mjcf(name, body) for name, body in named), strict=True)
+        parts = "\n    ".join([*self._surfaces_mjcf(), *bodies])
+        qpos, qvel = (itertools.chain(*each) for each in zip(*starts, strict=True))
         return f"""<mujoco model="{self.name}">
   <option timestep="{timestep}" gravity="0 0 {-self.g}"/>
   <worldbody>
-    {(chr(10) + "    ").join(parts)}
+    {parts}
   </worldbody>
-  <contact>{pairs}</contact>
+  <contact>{"".join(self._pairs_mjcf())}</contact>
   <keyframe><key name="start" qpos="{_text(qpos)}" qvel="{_text(qvel)}"/></keyframe>
 </mujoco>
 """
+
+    def _surfaces_mjcf(self) -> Iterator[str]:
+        """Planes, as elements of MJCF."""
+        for surface, name, point, normal in self.planes(FACETS):
+            turn = upright(normal)
+            along = in_body_axes(turn, np.array(surface.velocity))
+            moves = (*along, 0.0, 0.0, surface.turning)
+            belt = f'surfacevel="{_text(moves)}" ' if any(moves) else ""
+            yield (
+                f'<geom name="{name}" type="plane" size="0 0 1" pos="{_text(point)}" '
+                f'quat="{_text(turn)}" {belt}friction="{surface.friction} 0 0"/>'
+            )
+
+    def _body_mjcf(self, name: str, body: Body) -> tuple[str, tuple[list[float], list[float]]]:
+        """A body as an element of MJCF; its coordinates and velocities at the start."""
+        joint, shape = "<freejoint/>", {"tripod": "sphere", "disc": "cylinder"}.get(body.shape)
+        # MuJoCo counts the spin of a free body in its own axes.
+        spin = in_body_axes(body.orientation, body.spin)
+        start = [*body.position, *body.orientation], [*body.velocity, *spin]
+        if self.joint:
+            joint = f'<joint type="slide" axis="{_text(self.joint)}" frictionloss="{self.dry}"/>'
+            start = [0.0], [float(np.dot(self.joint, body.velocity))]
+        size = body.size[:1] if body.shape == "tripod" else body.size
+        look = f'type="{shape or body.shape}" size="{_text(size)}"'
+        geoms = [
+            f'<geom name="{name}{k or ""}" {look} pos="{_text(at)}" friction="0 0 0"/>'
+            for k, at in enumerate(body.parts)
+        ]
+        at = f'pos="{_text(body.position)}" quat="{_text(body.orientation)}"'
+        text = f"""<body name="{name}" {at}>
+      {joint}
+      <inertial pos="0 0 0" mass="{body.mass}" diaginertia="{_text(body.inertia)}"/>
+      {_INDENT.join(geoms)}
+    </body>"""
+        return text, start
+
+    def _pairs_mjcf(self) -> Iterator[str]:
+        """Contact pairs whose friction isn't that of a surface, as elements of MJCF."""
+        lowest = ("body", "under")[len(self.bodies) - 1]
+        frictions = [("under", "body", self.between, self.between)] if self.under else []
+        # The engine's first direction on a level plane is y, its second one x.
+        frictions += [
+            (surface.name, lowest, surface.across, surface.friction)
+            for surface in self.surfaces
+            if surface.across
+        ]
+        for one, other, first, second in frictions:
+            yield f'<pair geom1="{one}" geom2="{other}" friction="{first} {second} 0 0 0"/>'
+
+
+_INDENT = "\n      "
 
 
 def _text(numbers: Any) -> str:

@@ -89,6 +89,11 @@ def sentences(f: Forecast) -> Iterator[str]:
         )
     if not (f.change or f.remedy or sliding or short or moving or rattling or f.settled.collapsed):
         yield "Nothing needs to change."
+    yield from _worth_knowing(f)
+
+
+def _worth_knowing(f: Forecast) -> Iterator[str]:
+    """What else one should know of a model: what sleeps, is jammed, is replaced, is left out."""
     if f.settled.asleep:
         yield (
             "MuJoCo puts to sleep, so that nothing creeps till it wakes: "

@@ -49,16 +49,7 @@ LEAST = 1e-8
 FEW = 3
 """So many engines have room for their errors beside their marks."""
 ENTRY_MARKS = "osv^DPX*<>phd"
-ENTRY_COLOURS = (
-    "#0072B2",
-    "#D55E00",
-    "#009E73",
-    "#CC79A7",
-    "#E69F00",
-    "#56B4E9",
-    "#000000",
-    "#8C564B",
-)
+ENTRY_COLOURS = "#0072B2 #D55E00 #009E73 #CC79A7 #E69F00 #56B4E9 #000000 #8C564B".split()
 
 
 def measure(

@@ -71,10 +71,6 @@ class Search:
     """Width at which it is narrow enough."""
 
 
-Question = tuple[Search, float, Bracket]
-"""What is asked, at which value, given the bracket so far."""
-
-
 @dataclass(frozen=True, eq=False)
 class Reply:
     """A run that was asked and what it says; no run where it broke down."""
@@ -95,67 +91,78 @@ def narrow(runner: Runner, searches: Sequence[Search], careful: bool = True) -> 
 
     With `careful` the ends of the brackets are asked once more with half the time step: one that
     doesn't hold is as uncertain as the bracket before it was wide, see `Bracket.shift`."""
-    failures, sections = dict[Search, str](), runner.sampling.sections
-    brackets = [search.bracket for search in searches]
-    before, todo = list(brackets), list(range(len(searches)))
-    while todo := [k for k in todo if brackets[k].width > searches[k].width]:
-        inside = {
-            k: np.linspace(brackets[k].low, brackets[k].high, sections + 2).tolist()[1:-1]
-            for k in todo
-        }
-        replies = _answers(
-            runner,
-            [(searches[k], value, brackets[k]) for k in todo for value in inside[k]],
-            failures,
-        )
-        for n, k in enumerate(todo):
-            before[k] = brackets[k]
-            brackets[k] = _narrowed(
-                brackets[k], inside[k], replies[n * sections : (n + 1) * sections]
-            )
-        todo = [k for k in todo if brackets[k].width < 0.51 * before[k].width]
-    granted = [
-        (k, end)
-        for k, b in enumerate(brackets)
-        for end in (0, 1)
-        if not (b.runs[end] or runner.sampling.granted)
-    ]
-    replies = _answers(
-        runner, [(searches[k], brackets[k].ends[end], brackets[k]) for k, end in granted], failures
-    )
-    for (k, end), reply in zip(granted, replies, strict=True):
-        if reply.answer is (end == 0):
-            yes, no = brackets[k].runs
-            brackets[k] = replace(brackets[k], runs=(yes, reply.run) if end else (reply.run, no))
+    asked = _Narrowing(runner, searches)
+    asked.rounds()
+    asked.granted_ends()
     if careful:
-        asked = [(s, value, b) for s, b in zip(searches, brackets, strict=True) for value in b.ends]
-        replies = _answers(runner, asked, failures, FINER)
+        asked.ends_with_half_the_step()
+    failures = [asked.failures.get(search, "") for search in searches]
+    both = zip(asked.brackets, failures, strict=True)
+    return [replace(bracket, failure=failure) for bracket, failure in both]
+
+
+class _Narrowing:
+    """Searches that are narrowed down together, step by step, each with its bracket so far."""
+
+    def __init__(self, runner: Runner, searches: Sequence[Search]) -> None:
+        self.runner, self.searches = runner, searches
+        self.brackets = [search.bracket for search in searches]
+        self.before = list(self.brackets)
+        """Those of the round before."""
+        self.failures = dict[Search, str]()
+        """Why a run of a search broke down."""
+
+    def rounds(self) -> None:
+        """Ask inside all brackets that are too wide, until none is or runs show no more."""
+        sections, todo = self.runner.sampling.sections, list(range(len(self.searches)))
+        while todo := [k for k in todo if self.brackets[k].width > self.searches[k].width]:
+            ends = (self.brackets[k].ends for k in todo)
+            inside = [np.linspace(*both, sections + 2).tolist()[1:-1] for both in ends]
+            asked = [(k, value) for k, row in zip(todo, inside, strict=True) for value in row]
+            replies = iter(self.answers(asked))
+            for k, values in zip(todo, inside, strict=True):
+                self.before[k] = self.brackets[k]
+                own = [next(replies) for _ in values]
+                self.brackets[k] = _narrowed(self.brackets[k], values, own)
+            todo = [k for k in todo if self.brackets[k].width < 0.51 * self.before[k].width]
+
+    def granted_ends(self) -> None:
+        """Ask at the ends that were taken for granted, unless they still are to be."""
+        if self.runner.sampling.granted:
+            return
+        unseen = [(k, n) for k, b in enumerate(self.brackets) for n in (0, 1) if not b.runs[n]]
+        replies = self.answers([(k, self.brackets[k].ends[end]) for k, end in unseen])
+        for (k, end), reply in zip(unseen, replies, strict=True):
+            if reply.answer is (end == 0):
+                yes, no = self.brackets[k].runs
+                runs = (yes, reply.run) if end else (reply.run, no)
+                self.brackets[k] = replace(self.brackets[k], runs=runs)
+
+    def ends_with_half_the_step(self) -> None:
+        """Ask at all ends with half the time step: those that don't hold are less certain."""
+        asked = [(k, value) for k, b in enumerate(self.brackets) for value in b.ends]
+        replies = self.answers(asked, FINER)
         for k, (low, high) in enumerate(zip(replies[::2], replies[1::2], strict=True)):
             if low.answer is False or high.answer is True or not (low.run and high.run):
-                brackets[k] = replace(brackets[k], shift=before[k].width)
-    return [
-        replace(b, failure=failures.get(search, ""))
-        for search, b in zip(searches, brackets, strict=True)
-    ]
+                self.brackets[k] = replace(self.brackets[k], shift=self.before[k].width)
 
-
-def _answers(
-    runner: Runner, questions: Sequence[Question], failures: dict[Search, str], how: Attempt = USUAL
-) -> list[Reply]:
-    """Carry out a run for each question; those without an answer anew for longer."""
-    tasks, replies = [search.task(value, bracket, how) for search, value, bracket in questions], []
-    for (search, *_), task, run in zip(questions, tasks, runner.each(tasks), strict=True):
-        if isinstance(run, str):
-            failures[search] = run
-            replies.append(Reply(task, None, None))
-        else:
-            replies.append(Reply(task, run, search.answer(run)))
-    unclear = [n for n, reply in enumerate(replies) if reply.run and reply.answer is None]
-    if how is USUAL and unclear:
-        longer = _answers(runner, [questions[n] for n in unclear], failures, LONGER)
-        for n, reply in zip(unclear, longer, strict=True):
-            replies[n] = reply
-    return replies
+    def answers(self, asked: Sequence[tuple[int, float]], how: Attempt = USUAL) -> list[Reply]:
+        """Carry out a run for each question, the number of a search and a value; those without an
+        answer anew for longer."""
+        replies, searches = [], [self.searches[k] for k, _ in asked]
+        tasks = [self.searches[k].task(value, self.brackets[k], how) for k, value in asked]
+        for search, task, run in zip(searches, tasks, self.runner.each(tasks), strict=True):
+            if isinstance(run, str):
+                self.failures[search] = run
+                replies.append(Reply(task, None, None))
+            else:
+                replies.append(Reply(task, run, search.answer(run)))
+        unclear = [n for n, reply in enumerate(replies) if reply.run and reply.answer is None]
+        if how is USUAL and unclear:
+            longer = self.answers([asked[n] for n in unclear], LONGER)
+            for n, reply in zip(unclear, longer, strict=True):
+                replies[n] = reply
+        return replies
 
 
 def _narrowed(bracket: Bracket, values: Sequence[float], replies: Sequence[Reply]) -> Bracket:
@@ -164,9 +171,8 @@ def _narrowed(bracket: Bracket, values: Sequence[float], replies: Sequence[Reply
     places, said = [bracket.low, *values, bracket.high], [True, *answers, False]
     shown = [bracket.runs[0], *runs, bracket.runs[1]]
     yes = max(n for n in range(said.index(False)) if said[n])
-    undecided = [
-        n for n, (answer, run) in enumerate(zip(said, shown, strict=True)) if answer is None and run
-    ]
+    both = enumerate(zip(said, shown, strict=True))
+    undecided = [n for n, (answer, run) in both if answer is None and run]
     no = said.index(False, max(undecided, default=yes))
     by = tuple(reply.task for reply in replies[max(yes - 1, 0) : no])
     all_said = *bracket.said, *zip(values, answers, strict=True)

@@ -50,10 +50,11 @@ class Evidence:
 
     def motions(self, m: Measurement) -> list[Motion]:
         """The runs of a measurement whose files are there."""
-        there = [name for name in m.runs if storage.exists(self.directory / name)]
+        paths = [(name, self.directory / name) for name in m.runs]
         return [
-            Motion(name, m.engine, m.parameters, partial(storage.load, self.directory / name))
-            for name in there
+            Motion(name, m.engine, m.parameters, partial(storage.load, path))
+            for name, path in paths
+            if storage.exists(path)
         ]
 
 
@@ -128,12 +129,8 @@ def warn_of(figure: Figure, off: float) -> list[str]:
 def select(name: str, set: str, measured: _Rows | None, evidence: Evidence) -> Diagram:
     """What a figure shows of one set: what was measured with it, and the runs that are there."""
     states = tuple(m for m in measured(evidence) if m.set == set) if measured else ()
-    return Diagram(
-        name,
-        Parameters.named(set),
-        states,
-        tuple(run for m in states for run in evidence.motions(m)),
-    )
+    motions = tuple(run for m in states for run in evidence.motions(m))
+    return Diagram(name, Parameters.named(set), states, motions)
 
 
 SUFFIXES = (".svg", ".pdf", ".png")

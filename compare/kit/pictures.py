@@ -78,9 +78,7 @@ def svg(figure: Figure) -> str:
     # Places rounded to hundredths of a point, and no superfluous spaces: half as long.
     short = functools.partial(re.sub, r" +(?=[ \"])|(?<=\.\d\d)\d+", "")
     text = re.sub(r' (?:d|x|y)="[^"]*"|translate\([^)]*\)', lambda places: short(places[0]), text)
-    return re.sub(
-        r' style="[^"]*"', lambda style: style[0].replace(": ", ":").replace("; ", ";"), text
-    )
+    return re.sub(r' style="[^"]*"', lambda found: re.sub("([:;]) ", r"\1", found[0]), text)
 
 
 def embedded(pictures: Mapping[str, str]) -> tuple[dict[str, str], str]:
@@ -93,30 +91,24 @@ def embedded(pictures: Mapping[str, str]) -> tuple[dict[str, str], str]:
         text = re.sub(letter, "", picture).replace("<defs></defs>", "")
         # for all lines of a picture: pages have it, too
         text = re.sub(r"<style.*?</style>", "", text)
-        text = re.sub(r'(id="|url\(#|href="#)(n\d+)\b', rf"\1f{k}\2", text).replace(
-            "xlink:href", "href"
-        )
+        text = text.replace("xlink:href", "href")
+        text = re.sub(r'(id="|url\(#|href="#)(n\d+)\b', rf"\1f{k}\2", text)
         start = re.match(r'<svg[^>]*?(viewBox="0 0 ([\d.]+)[^"]*")[^>]*>', text)
         assert start
         # letters of 10 points are at least 6.4 pixels high on a phone
         least = 0.64 * float(start[2])
-        made[name] = (
-            f'<svg {start[1]} role="img" style="--least:{least:.0f}px">' + text[start.end() :]
-        )
-    return (
-        made,
-        f'<svg width="0" height="0" '
-        f'style="position:absolute"><defs>{"".join(letters.values())}</defs></svg>',
-    )
+        head = f'<svg {start[1]} role="img" style="--least:{least:.0f}px">'
+        made[name] = head + text[start.end() :]
+    shared = f"<defs>{''.join(letters.values())}</defs>"
+    return made, f'<svg width="0" height="0" style="position:absolute">{shared}</svg>'
 
 
 def plain(label: str) -> str:
     """A label of matplotlib without TeX: "$\\omega_c$ (rad/s)" is "ω_c (rad/s)"."""
     for tex, text in _TEX.items():
         label = label.replace(tex, text)
-    label = re.sub(
-        r"\\tilde(?:\{(\w)\}| ?(\w))", lambda found: f"{found[1] or found[2]}\u0303", label
-    )
+    tilde = r"\\tilde(?:\{(\w)\}| ?(\w))"
+    label = re.sub(tilde, lambda found: f"{found[1] or found[2]}\u0303", label)
     return re.sub(r"[${}]|\\", "", label).replace("\n", " ")
 
 
@@ -126,13 +118,9 @@ def _scales(figure: Figure, axes: Axes) -> dict[str, Any]:
     a + b times the place is the value, or its logarithm."""
     width, height = 72 * figure.get_size_inches()
     box = axes.get_position()
-    places = {
-        "x": (box.x0 * width, box.x1 * width),
-        "y": (height * (1 - box.y0), height * (1 - box.y1)),
-    }
-    scales: dict[str, Any] = {
-        "box": [round(float(v), 2) for v in (*places["x"], *reversed(places["y"]))]
-    }
+    across, up = (box.x0 * width, box.x1 * width), (height * (1 - box.y0), height * (1 - box.y1))
+    places = {"x": across, "y": up}
+    scales: dict[str, Any] = {"box": [round(float(v), 2) for v in (*across, *reversed(up))]}
     for name, (first, last) in places.items():
         axis, limits = getattr(axes, f"{name}axis"), getattr(axes, f"get_{name}lim")()
         alike = axes, *getattr(axes, f"get_shared_{name}_axes")().get_siblings(axes)
@@ -153,18 +141,14 @@ def _join_marks(group: ElementTree.Element) -> None:
         (mark.tag, mark.get(f"{_XLINK}href"), mark.get("style"), *sorted(mark.keys()))
         for mark in group
     }
-    if (
-        len(group) < _FEW
-        or len(looks) > 1
-        or group[0].tag != f"{_SVG}use"
-        or {"x", "y"} - {*group[0].keys()}
-    ):
+    if len(group) < _FEW or len(looks) > 1:
         return
     first = group[0]
+    if first.tag != f"{_SVG}use" or {"x", "y"} - {*first.keys()}:
+        return
     name = f"{first.attrib[f'{_XLINK}href'][1:]}marks"
-    shape = ElementTree.Element(
-        f"{_SVG}marker", {"id": name, "overflow": "visible", "markerUnits": "userSpaceOnUse"}
-    )
+    as_drawn = {"id": name, "overflow": "visible", "markerUnits": "userSpaceOnUse"}
+    shape = ElementTree.Element(f"{_SVG}marker", as_drawn)
     look = {key: first.attrib[key] for key in (f"{_XLINK}href", "style") if key in first.attrib}
     ElementTree.SubElement(shape, f"{_SVG}use", look)
     way = "M " + " ".join(f"{mark.get('x')} {mark.get('y')}" for mark in group)
@@ -172,9 +156,8 @@ def _join_marks(group: ElementTree.Element) -> None:
     for mark in list(group):
         group.remove(mark)
     group.append(shape)
-    ElementTree.SubElement(
-        group, f"{_SVG}path", {"d": way, "fill": "none", "stroke": "none", **ends}
-    )
+    path = {"d": way, "fill": "none", "stroke": "none", **ends}
+    ElementTree.SubElement(group, f"{_SVG}path", path)
 
 
 def _renumber(root: ElementTree.Element) -> None:
@@ -182,19 +165,12 @@ def _renumber(root: ElementTree.Element) -> None:
     names: dict[str, str] = {}
 
     def new_name(found: re.Match[str]) -> str:
-        return found[1] + (
-            found[2] if "-" in found[2] else names.setdefault(found[2], f"n{len(names)}")
-        )
+        before, name = found[1], found[2]
+        return before + (name if "-" in name else names.setdefault(name, f"n{len(names)}"))
 
+    markers = "marker-start", "marker-mid", "marker-end"
     for each in root.iter():
-        for attribute in (
-            f"{_XLINK}href",
-            "clip-path",
-            "style",
-            "marker-start",
-            "marker-mid",
-            "marker-end",
-        ):
+        for attribute in (f"{_XLINK}href", "clip-path", "style", *markers):
             if "#" in (text := each.get(attribute, "")):
                 each.set(attribute, re.sub(r"(^#|url\(#)([\w-]+)", new_name, text))
     for each in root.iter():

@@ -108,16 +108,14 @@ def settle(
         for n, start in todo.items():
             step, t_end = coarse_step(start.p), duration(start.p, span * left[n].pop(0))
             samples = round(t_end / (STEPS_A_SAMPLE * step))
-            tasks.append(
-                runner.task(start.p, start.x0, t_end, step / criteria.divisor, samples=samples)
-            )
+            step /= criteria.divisor
+            tasks.append(runner.task(start.p, start.x0, t_end, step, samples=samples))
         under_way, todo = list(todo), {}
         for n, task, run in zip(under_way, tasks, runner.each(tasks), strict=True):
             start = starts[n]
             if isinstance(run, str):
-                states[n] = SteadyState(
-                    start, Case.NN, {}, start.x0, task, failure=f"the run {run}"
-                )
+                failure = f"the run {run}"
+                states[n] = SteadyState(start, Case.NN, {}, start.x0, task, failure=failure)
                 continue
             state = states[n] = judge_run(start, task, run, loose)
             part = task.t_end / duration(start.p, span)
@@ -151,46 +149,50 @@ def judge_run(start: Start, task: Task, run: Trajectory, loose: float = 1.0) -> 
     p = start.p
     series = {name: getattr(run, name) for name in ("omega_c", "slip_x", "slip_y", "slip_z", "v_y")}
     series["wall_spin"] = run.slip_x + p.R / p.r * run.omega_c
-    series |= {
-        f"force_{name}": values for name, values in forces(run.force_A.T, run.force_B.T).items()
-    }
-    rows = np.stack([*series.values(), *run.x.T])
-    solved = SOLVED / (p.c * coarse_step(p))
-    states = []
-    for length in (len(run.time) // 2, len(run.time) // 8):
-        counts = np.bincount(run.case[-length:])
-        case = Case(int(counts.argmax()))
-        means, drifts = steady_mean(rows, length)
-        mean, drift = (dict(zip(series, row.tolist(), strict=False)) for row in (means, drifts))
-        # Where both contacts roll only sums of forces are determined; nothing but the wall turns a
-        # ball about the vertical.
-        free = {"slip_y"} if case.B is Contact.N else set[str]()
-        free |= set(FORCES) - set(SUMS) if case is Case.RR else set(SUMS) - set(FORCES)
-        groups = [[q for q in group if q not in free] for group in ERROR_GROUPS]
-        worst = {
-            q: max(drift[each] / quantity(each).size(p) for each in group)
-            for group in groups
-            for q in group
-        }
-        values = {
-            q: estimate(mean[q], quantity(q).size(p), solver=solved, drift=worst[q]) for q in worst
-        }
-        swings = max(float(np.ptp(series[q][-length:])) / quantity(q).size(p) for q in worst)
-        drifting = max(COVERAGE * 2 * worst[q] / quantity(q).resolution for q in worst)
-        # the same however long a run is
-        solving = max(COVERAGE * solved / quantity(q).resolution for q in worst)
-        excess, failure = max(drifting, swings / 1e-3), ""
-        if counts.max() < 0.98 * length and loose < math.inf:
-            excess = math.inf
-            failure = (
-                f"its contacts keep changing ({case.name} in {counts.max() / length:.0%} of the "
-                "last samples)"
-            )
-        elif max(excess, solving) > loose:
-            way = "drifts" if max(drifting, solving) > loose else "swings"
-            failure = f"{case.name} still {way}, {max(excess, solving):.2g} times the limit"
-        states.append(SteadyState(start, case, values, means[len(series) :], task, excess, failure))
+    acting = forces(run.force_A.T, run.force_B.T)
+    series |= {f"force_{name}": values for name, values in acting.items()}
+    lengths = len(run.time) // 2, len(run.time) // 8
+    states = (_judge_window(start, task, run, series, length, loose) for length in lengths)
     return min(states, key=lambda state: state.excess)
+
+
+def _judge_window(
+    start: Start, task: Task, run: Trajectory, series: dict[str, Array], length: int, loose: float
+) -> SteadyState:
+    """The state by so many samples at the end of a run, of which these are series by quantity."""
+    p, counts = start.p, np.bincount(run.case[-length:])
+    case = Case(int(counts.argmax()))
+    means, drifts = steady_mean(np.stack([*series.values(), *run.x.T]), length)
+    mean, drift = (dict(zip(series, row.tolist(), strict=False)) for row in (means, drifts))
+    sizes, solved = {q: quantity(q).size(p) for q in series}, SOLVED / (p.c * coarse_step(p))
+    worst = {
+        q: max(drift[each] / sizes[each] for each in group)
+        for group in _determined(case)
+        for q in group
+    }
+    values = {q: estimate(mean[q], sizes[q], solver=solved, drift=worst[q]) for q in worst}
+    swings = max(float(np.ptp(series[q][-length:])) / sizes[q] for q in worst)
+    drifting = max(COVERAGE * 2 * worst[q] / quantity(q).resolution for q in worst)
+    # the same however long a run is
+    solving = max(COVERAGE * solved / quantity(q).resolution for q in worst)
+    excess, failure = max(drifting, swings / 1e-3), ""
+    if counts.max() < 0.98 * length and loose < math.inf:
+        share, excess = f"{case.name} in {counts.max() / length:.0%} of the last samples", math.inf
+        failure = f"its contacts keep changing ({share})"
+    elif max(excess, solving) > loose:
+        way = "drifts" if max(drifting, solving) > loose else "swings"
+        failure = f"{case.name} still {way}, {max(excess, solving):.2g} times the limit"
+    return SteadyState(start, case, values, means[len(series) :], task, excess, failure)
+
+
+def _determined(case: Case) -> list[list[str]]:
+    """Of `ERROR_GROUPS` the quantities that are determined in a case.
+
+    Where both contacts roll only sums of forces are; nothing but the wall turns a ball about the
+    vertical."""
+    free = {"slip_y"} if case.B is Contact.N else set[str]()
+    free |= set(FORCES) - set(SUMS) if case is Case.RR else set(SUMS) - set(FORCES)
+    return [[q for q in group if q not in free] for group in ERROR_GROUPS]
 
 
 def settle_finer(
@@ -280,12 +282,8 @@ def rounded_duration(p: Parameters, units: float) -> float:
 def initial_condition(set: str, p: Parameters, how: str) -> Start:
     """A start at the flow of p: from rest, with the fluid, half as fast, or up the wall."""
     orbit = {"rest": 0.0, "half as fast": p.omega_0 / 2}.get(how, p.omega_0)
-    return Start(
-        set,
-        p,
-        how,
-        State(y=safe_height(p) if how == "on the wall" else 0.0, omega_c=orbit).stacked(),
-    )
+    height = safe_height(p) if how == "on the wall" else 0.0
+    return Start(set, p, how, State(y=height, omega_c=orbit).stacked())
 
 
 def starts_at(set: str, p: Parameters, how: str, flows: Iterable[float]) -> list[Start]:

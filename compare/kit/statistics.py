@@ -40,13 +40,9 @@ class Estimate:
 
     def times(self, factor: float) -> Self:
         """The estimate of a number that is so many times as large."""
+        value, uncertainty = self.value * factor, self.uncertainty * abs(factor)
         budget = {cause: u * abs(factor) for cause, u in self.budget.items()}
-        return replace(
-            self,
-            value=self.value * factor,
-            uncertainty=self.uncertainty * abs(factor),
-            budget=budget,
-        )
+        return replace(self, value=value, uncertainty=uncertainty, budget=budget)
 
 
 def uniform(half: float) -> float:
@@ -165,9 +161,8 @@ def straight_line(
     The uncertainties are those of the points carried over, and the scatter about the line where
     that is larger."""
     x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-    weight = (
-        np.maximum(np.broadcast_to(noise, y.shape), np.finfo(float).eps * np.abs(y).max()) ** -2.0
-    )
+    least = np.finfo(float).eps * np.abs(y).max()
+    weight = np.maximum(np.broadcast_to(noise, y.shape), least) ** -2.0
     # About the weighted mean, height and slope are independent of each other, and one point may
     # outweigh all others.
     x0, y0 = np.average(x, weights=weight), np.average(y, weights=weight)
@@ -190,9 +185,8 @@ def zero_and_slope(x: Array, y: Array, noise: Array) -> tuple[Estimate, Estimate
     def fitted(values: Array, degree: int) -> Array:
         fit = Polynomial.fit(x, values, degree)
         zeros = [zero for zero in _real_roots(fit) if x.min() < zero < x.max()]
-        return np.array(
-            [zeros[0], fit.deriv()(zeros[0])] if len(zeros) == 1 else [math.nan, math.nan]
-        )
+        zero = zeros[0] if len(zeros) == 1 else math.nan
+        return np.array([zero, fit.deriv()(zero)])
 
     degree = len(x) - 1
     best = fitted(y, degree)
@@ -208,18 +202,21 @@ def zero_and_slope(x: Array, y: Array, noise: Array) -> tuple[Estimate, Estimate
 
 def extrapolated_zero(where: Array, values: Sequence[Estimate]) -> Estimate:
     """The place (n,) at which a quantity is zero; the value nearest to zero comes first."""
-    return _extrapolated(
-        lambda y, n: float(Polynomial.fit(y[:n] / np.abs(y).max(), where[:n], n - 1)(0.0)), values
-    )
+
+    def zero(y: Array, n: int) -> float:
+        return float(Polynomial.fit(y[:n] / np.abs(y).max(), where[:n], n - 1)(0.0))
+
+    return _extrapolated(zero, values)
 
 
 def initial_slope(where: Array, values: Sequence[Estimate]) -> Estimate:
     """Derivative of the place by a quantity at its zero; as `extrapolated_zero`."""
     size = max(abs(m.value) for m in values)
-    return _extrapolated(
-        lambda y, n: float(Polynomial.fit(y[:n] / size, where[:n], n - 1).deriv()(0.0)) / size,
-        values,
-    )
+
+    def slope(y: Array, n: int) -> float:
+        return float(Polynomial.fit(y[:n] / size, where[:n], n - 1).deriv()(0.0)) / size
+
+    return _extrapolated(slope, values)
 
 
 def extrapolated_maximum(
@@ -232,9 +229,8 @@ def extrapolated_maximum(
     def maximum(y: Array, n: int) -> float:
         y = y[:n] / np.abs(y).max()
         fit = Polynomial.fit(y, where[:n], n - 1)
-        beyond = [
-            root for root in _real_roots(fit.deriv()) if 0 < (root - y[0]) / (y[0] - y[-1]) < FAR
-        ]
+        tops, row = _real_roots(fit.deriv()), y[0] - y[-1]
+        beyond = [root for root in tops if 0 < (root - y[0]) / row < FAR]
         nearest = min(beyond, key=lambda root: abs(root - y[0]), default=math.nan)
         return float((fit if others is None else Polynomial.fit(y, others[:n], n - 1))(nearest))
 
@@ -250,9 +246,7 @@ def _extrapolated(found: Callable[[Array, int], float], points: Sequence[Estimat
     error is the term after the last, or the sum of all further terms where the last two changes
     have the same sign: with the largest ratio where their ratio has grown, as it does where the
     quantity is no smooth function."""
-    values, noise = (
-        np.array([getattr(m, name) for m in points]) for name in ("value", "uncertainty")
-    )
+    values, noise = np.transpose([(point.value, point.uncertainty) for point in points])
     count = len(values)
     row = np.array([found(values, n) for n in range(count - 3, count + 1)])
     changes = np.abs(np.diff(row))

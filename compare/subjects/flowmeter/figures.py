@@ -201,12 +201,9 @@ def draw_fall(of: Diagram) -> tuple[Figure, str]:
     whole, close = panels.T
     near = max(0.02, 12 * float(np.median(np.diff(run.time))))
     around, landing = (left - 0.3, left + 1.7), (lands - near, lands + near)
-    # Axes, span of time, its origin, and the units of time and gaps, in parts of a second and of a
-    # metre.
-    for column, span, origin, unit, size in (
-        (whole, around, left, 1.0, 1e3),
-        (close, landing, lands, 1e3, 1e6),
-    ):
+    # Span of time, its origin, and the units of time and gaps, in parts of a second and of a metre.
+    views = (whole, around, left, 1.0, 1e3), (close, landing, lands, 1e3, 1e6)
+    for column, span, origin, unit, size in views:
         k = np.flatnonzero((run.time > span[0]) & (run.time < span[1]))
         k = k[:: max(1, len(k) // 1500)]
         t = unit * (run.time[k] - origin)

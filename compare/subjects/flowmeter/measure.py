@@ -38,6 +38,7 @@ from compare.kit.scales import time_unit
 from compare.kit.settling import SettlingCriteria, SteadyState
 from compare.kit.statistics import Estimate, estimate, settled_case, uniform
 from compare.kit.step_pairs import Start, StepPair, StepPairResult, carry_out
+from compare.kit.tasks import Task
 from model import Case, Flow, Parameters, State, Trajectory
 from model.trajectory import columns
 
@@ -156,19 +157,12 @@ def hysteresis(runner: Runner, sets: Sets, records: Records) -> Measured:
     for name, p in sets.items():
         if rise := _levels(name, records, runner.sampling.hysteresis_parts):
             sides = [("up", flow) for flow in rise] + [("down", flow) for flow in rise[-2::-1]]
-            loops[name] = [
-                Start(name, p.replace(omega_0=flow), side, np.zeros(8)) for side, flow in sides
-            ]
+            starts = ((p.replace(omega_0=flow), side) for side, flow in sides)
+            loops[name] = [Start(name, q, side, np.zeros(8)) for q, side in starts]
         else:
             why = "no flow at which slipping on the floor gives way to riding the wall"
             yield runner.missing(name, why)
-    tasks = []
-    for loop in loops.values():  # a run through all levels, each held for a time
-        p, flows = loop[0].p, [level.p.omega_0 for level in loop]
-        step, hold = coarse_step(p), settling.duration(p, runner.sampling.hysteresis_hold)
-        samples = round(hold / (settling.STEPS_A_SAMPLE * step)) * len(flows)
-        flow, x0, lasts = Flow.staircase(flows, hold), State(omega_c=flows[0]), hold * len(flows)
-        tasks.append(runner.task(p, x0, lasts, step, flow=flow, samples=samples))
+    tasks = [_loop_task(runner, loop) for loop in loops.values()]
     for (name, loop), task, run in zip(loops.items(), tasks, runner.each(tasks), strict=True):
         if isinstance(run, str):
             yield runner.missing(name, f"the run {run}")
@@ -180,22 +174,37 @@ def hysteresis(runner: Runner, sets: Sets, records: Records) -> Measured:
             for m in records.select("settled", "omega_c")
             if m.set == name and m.parameters.omega_0 > 0
         )
-        count, before = (len(run.time) - 1) // len(loop), "RR"
-        for k, level in enumerate(loop):
-            held = slice(k * count, (k + 1) * count)
-            of_level = {column: getattr(run, column)[held] for column in columns(Trajectory)}
-            part, loose = replace(run, **of_level), runner.sampling.settled_loose
-            ended = settling.judge_run(replace(level, x0=part.x[0]), task, part, loose)
-            if ended.failure:
-                where = f"level {k + 1} ({level.name}, omega_0 = {level.p.omega_0:.4g} rad/s)"
-                yield runner.missing(name, f"{where}: {ended.failure}")
-            else:
-                at = Conditions(case=ended.case.name, side=level.name, level=k + 1.0, before=before)
-                yield runner.measurement(name, level.p, "case", ended.case, [task], **at)
-                omega_c = ended.values["omega_c"]
-                omega_c = omega_c.also(time_step=certainty * level.p.omega_0)
-                yield runner.measurement(name, level.p, "omega_c", omega_c, [task], **at)
-            before = settling.physical_case(ended.case).name
+        yield from _loop_rows(runner, loop, task, run, certainty)
+
+
+def _loop_task(runner: Runner, loop: Sequence[Start]) -> Task:
+    """A run through all levels of a loop, each held for a time."""
+    p, flows = loop[0].p, [level.p.omega_0 for level in loop]
+    step, hold = coarse_step(p), settling.duration(p, runner.sampling.hysteresis_hold)
+    samples = round(hold / (settling.STEPS_A_SAMPLE * step)) * len(flows)
+    flow, x0, lasts = Flow.staircase(flows, hold), State(omega_c=flows[0]), hold * len(flows)
+    return runner.task(p, x0, lasts, step, flow=flow, samples=samples)
+
+
+def _loop_rows(
+    runner: Runner, loop: Sequence[Start], task: Task, run: Trajectory, certainty: float
+) -> Measured:
+    """Measurements at each level of a loop; `certainty` is that of omega_c divided by omega_0."""
+    count, before = (len(run.time) - 1) // len(loop), "RR"
+    for k, level in enumerate(loop):
+        p, held = level.p, slice(k * count, (k + 1) * count)
+        of_level = {column: getattr(run, column)[held] for column in columns(Trajectory)}
+        part, loose = replace(run, **of_level), runner.sampling.settled_loose
+        ended = settling.judge_run(replace(level, x0=part.x[0]), task, part, loose)
+        if ended.failure:
+            where = f"level {k + 1} ({level.name}, omega_0 = {p.omega_0:.4g} rad/s)"
+            yield runner.missing(level.set, f"{where}: {ended.failure}")
+        else:
+            at = Conditions(case=ended.case.name, side=level.name, level=k + 1.0, before=before)
+            omega_c = ended.values["omega_c"].also(time_step=certainty * p.omega_0)
+            yield runner.measurement(level.set, p, "case", ended.case, [task], **at)
+            yield runner.measurement(level.set, p, "omega_c", omega_c, [task], **at)
+        before = settling.physical_case(ended.case).name
 
 
 def _levels(name: str, records: Records, parts: int) -> list[float]:

@@ -16,7 +16,7 @@ where that is born.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import islice, zip_longest
@@ -28,7 +28,7 @@ from compare.kit.brackets import Attempt, Bracket, Search, narrow
 from compare.kit.conditions import Conditions
 from compare.kit.levels import Level
 from compare.kit.programme import Protocol
-from compare.kit.record import Measured, Records, Sets, if_found
+from compare.kit.record import Measured, Measurement, Missing, Records, Sets, if_found
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.settling import (
@@ -171,19 +171,9 @@ def borders(runner: Runner, sets: Sets, records: Records) -> Measured:
         for name, (low, high) in limits.items()
         for part in (CLOSING if name == soonest else runner.sampling.edge_flows)
     ]
-    ways = ("rest", "on the wall")
-    starts = [[initial_condition(name, p, how) for how in ways] for name, p in flows]
-    settled = settle_groups(runner, starts, SettlingCriteria(loose=10.0))
-    edges = []  # first on the line between the two attractors
-    for (name, p), (slipping, lifted) in zip(flows, settled, strict=True):
-        if not (slipping.settled_in(Case.SS) and lifted.settled_in(Case.NR, Case.SR)):
-            came_to = ", ".join(state.failure or state.case.name for state in (slipping, lifted))
-            why = f"no two attractors settled at omega_0 = {p.omega_0:.4g} rad/s: {came_to}"
-            yield runner.missing(name, why)
-        else:
-            # on floor and wall: a lifted ball moves alike at every height
-            a, b = (constrained(Case.SS, state.mean, p) for state in (slipping, lifted))
-            edges.append(Edge(runner, name, p, a, b, a, b - a))
+    found = list(_first_lines(runner, flows))
+    yield from (each for each in found if isinstance(each, Missing))
+    edges = [each for each in found if isinstance(each, Edge)]
     for _ in range(runner.sampling.edge_lines):
         lines = [edge.with_next_line() for edge in edges]
         brackets = narrow(runner, [line.search() for line in lines], careful=False)
@@ -195,18 +185,40 @@ def borders(runner: Runner, sets: Sets, records: Records) -> Measured:
         last = low + (max(CLOSING) + 1e-6) * (high - low)
         near = [edge for edge in edges if edge.moves and edge.set == name and edge.p.omega_0 < last]
         if len(near) >= len(CLOSING):
-            # The edge meets the lifted ball where both have the same omega_c.
-            noise = max(float(edge.uncertainty[2]) for edge in near)
-            apart = [estimate((edge.crossing - edge.lifted)[2], edge=noise) for edge in near]
-            place = extrapolated_zero(np.array([edge.p.omega_0 for edge in near]), apart)
-            tasks = [task for edge in near if edge.bracket for task in edge.bracket.tasks]
-            p = sets[name].replace(omega_0=place.value)
-            at = Conditions(side="from above", by="unstable slipping meets the lifted ball")
-            row = runner.measurement(name, p, "omega_02", place, tasks, **at)
-            yield if_found(row, "the edge points to no flow at which it meets the lifted ball")
+            yield _where_it_begins(near)
         elif name == soonest or not at_quick:
             why = "too few crossings to follow the edge to where it meets the lifted ball"
             yield runner.missing(name, why)
+
+
+def _first_lines(
+    runner: Runner, flows: Sequence[tuple[str, Parameters]]
+) -> Iterator[Edge | Missing]:
+    """Edges of sets and flows with the line between the two attractors, as far as these settle."""
+    ways = ("rest", "on the wall")
+    starts = [[initial_condition(name, p, how) for how in ways] for name, p in flows]
+    settled = settle_groups(runner, starts, SettlingCriteria(loose=10.0))
+    for (name, p), (slipping, lifted) in zip(flows, settled, strict=True):
+        if slipping.settled_in(Case.SS) and lifted.settled_in(Case.NR, Case.SR):
+            # on floor and wall: a lifted ball moves alike at every height
+            a, b = (constrained(Case.SS, state.mean, p) for state in (slipping, lifted))
+            yield Edge(runner, name, p, a, b, a, b - a)
+        else:
+            came_to = ", ".join(state.failure or state.case.name for state in (slipping, lifted))
+            why = f"no two attractors settled at omega_0 = {p.omega_0:.4g} rad/s: {came_to}"
+            yield runner.missing(name, why)
+
+
+def _where_it_begins(near: Sequence[Edge]) -> Measurement | Missing:
+    """The flow at which an edge meets the lifted ball: both have the same omega_c there."""
+    noise = max(float(edge.uncertainty[2]) for edge in near)
+    apart = [estimate((edge.crossing - edge.lifted)[2], edge=noise) for edge in near]
+    place = extrapolated_zero(np.array([edge.p.omega_0 for edge in near]), apart)
+    tasks = [task for edge in near if edge.bracket for task in edge.bracket.tasks]
+    at = Conditions(side="from above", by="unstable slipping meets the lifted ball")
+    first, p = near[0], near[0].p.replace(omega_0=place.value)
+    row = first.runner.measurement(first.set, p, "omega_02", place, tasks, **at)
+    return if_found(row, "the edge points to no flow at which it meets the lifted ball")
 
 
 @dataclass(frozen=True, eq=False)
@@ -361,21 +373,13 @@ def birth(runner: Runner, sets: Sets, records: Records) -> Measured:
     lags: dict[str, Estimate] = {}
     drags = [(name, kappa / time_unit(sets[name])) for name in ranges for kappa in FIRST_DRAGS]
     for _ in (FIRST_DRAGS, NEARER_DRAGS):
-        starts = []
-        for name, c in drags:
-            low, high = ranges[name]
-            flows = (high - part * (high - low) for part in BEFORE_FOLD)
-            starts.append(starts_at(name, sets[name].replace(c=c), "rest", flows))
-        for (name, c), states in zip(drags, settle_groups(runner, starts), strict=True):
-            if all(state.settled_in(Case.SS) for state in states):
-                places = np.array([state.start.p.omega_0 for state in states])
-                slope = initial_slope(places, [state.values["force_Ay"] for state in states])
-                found[name].append(BranchEnd(1 / c, slope, [state.task for state in states]))
+        in_drags = [(name, sets[name].replace(c=c), *ranges[name]) for name, c in drags]
+        for name, end in _branch_ends(runner, in_drags):
+            found[name].append(end)
         for name, own in found.items():
             if len(own) >= len(FIRST_DRAGS):
-                slopes, noise = zip(
-                    *((end.slope.value, end.slope.uncertainty) for end in own), strict=True
-                )
+                slopes = [end.slope.value for end in own]
+                noise = [end.slope.uncertainty for end in own]
                 lags[name], _ = straight_line([end.lag for end in own], slopes, noise)
         births = [(name, lag.value) for name, lag in lags.items() if lag.value > 0]
         drags = [(name, 1 / lag * k) for name, lag in births for k in NEARER_DRAGS]
@@ -393,6 +397,21 @@ def birth(runner: Runner, sets: Sets, records: Records) -> Measured:
             row = runner.measurement(name, p, "critical_drag", drag, tasks)
             sure = lag.value > COVERAGE * lag.uncertainty  # else the drag may have no bound
             yield row if sure else runner.missing(name, "no drag gives birth to a fold")
+
+
+def _branch_ends(
+    runner: Runner, drags: Sequence[tuple[str, Parameters, float, float]]
+) -> Iterator[tuple[str, BranchEnd]]:
+    """By set the ends of branches that settle, from sets and the flows between which they slip."""
+    starts = [
+        starts_at(name, p, "rest", [high - part * (high - low) for part in BEFORE_FOLD])
+        for name, p, low, high in drags
+    ]
+    for (name, p, *_), states in zip(drags, settle_groups(runner, starts), strict=True):
+        if all(state.settled_in(Case.SS) for state in states):
+            flows = np.array([state.start.p.omega_0 for state in states])
+            slope = initial_slope(flows, [state.values["force_Ay"] for state in states])
+            yield name, BranchEnd(1 / p.c, slope, [state.task for state in states])
 
 
 PROTOCOLS = (

@@ -556,11 +556,8 @@ def lift(runner: Runner, sets: Sets, records: Records) -> Measured:
     for arrow, tasks, got, runs, later, near in rows:
         leaves = next((Case(int(run.case[-1])) for run in runs if _force(run) is None), None)
         if not runs:
-            why = (
-                f"the run {got}"
-                if isinstance(got, str)
-                else "the ball doesn't stay in it at any orbit"
-            )
+            strays = "the ball doesn't stay in it at any orbit"
+            why = f"the run {got}" if isinstance(got, str) else strays
             yield runner.missing(arrow.set, f"out of {arrow.inner.name}: {why}")
         elif leaves is None:
             fastest = float(runs[-1].omega_c[0])
@@ -573,11 +570,8 @@ def lift(runner: Runner, sets: Sets, records: Records) -> Measured:
             why = f"a ball that leaves the floor out of {arrow.inner.name} ends in {leaves.name}"
             yield runner.missing(arrow.set, why)
         elif isinstance(near, str) or (onset := _onset(near)) is None:
-            why = (
-                f"the run {near}"
-                if isinstance(near, str)
-                else "the contact at the floor opens and closes"
-            )
+            chatters = "the contact at the floor opens and closes"
+            why = f"the run {near}" if isinstance(near, str) else chatters
             yield runner.missing(arrow.set, f"where the ball leaves {arrow.inner.name} {why}")
         else:
             yield arrow.row("lift_onset", 1 / time_unit(arrow.p), onset, later)

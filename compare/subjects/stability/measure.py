@@ -343,11 +343,8 @@ def _modes(state: Pushed, modes: Spectrum, step: float, row: Row) -> Measured:
     order = np.lexsort((-exponents.real, exponents.imag))
     for mode, k in enumerate((k for k in order if exponents[k].imag >= 0), start=1):
         if abs(exponents[k]) * step > 0.25:
-            yield state.missing(
-                f"one of its motions, by {abs(exponents[k]):.3g} 1/s, is too fast for the time "
-                f"step",
-                1,
-            )
+            why = f"one of its motions, by {abs(exponents[k]):.3g} 1/s, is too fast"
+            yield state.missing(f"{why} for the time step", 1)
             continue
         rate, frequency = -float(exponents[k].real), float(exponents[k].imag)
         for name, value, other in (("decay_rate", rate, frequency), ("frequency", frequency, rate)):
@@ -373,11 +370,8 @@ def _responses(state: Pushed, answers: Sequence[Array], row: Row) -> Iterator[Me
     This shows the directions of the motions, not only their rates. It is extrapolated as `spectrum`
     does, to a vanishing push and step, and uncertain by what they change, by what two thirds of the
     record say, and by the accuracy of the solver."""
-    names, (lasts, samples), length = (
-        TRAITS[state.case].active,
-        state.record,
-        min(map(len, answers)),
-    )
+    names, length = TRAITS[state.case].active, min(map(len, answers))
+    lasts, samples = state.record
     lag = length // 3
     coarse, large, small = (propagator(answers[k][:length], lag) for k in (0, 1, -1))
     shorter = propagator(answers[-1][: 2 * lag], lag)

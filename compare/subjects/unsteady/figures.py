@@ -8,6 +8,7 @@ from functools import cache, partial
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
@@ -20,6 +21,7 @@ from compare.kit.drawing import Diagram, Evidence, GapError, diagram, only_where
 from compare.kit.record import Measurement
 from compare.subjects.unsteady.measure import RAMP, ROLLS_AT, caught_up, odd_part
 from model import Case, Flow, Parameters
+from model.arrays import Array
 
 _LASTS = 4.0, 56.0
 """Times shown after a jump: in units of 1/c, and of sqrt(R/g), whichever is shorter."""
@@ -108,41 +110,12 @@ def draw_unsteady(of: Diagram) -> tuple[Figure, str]:
     only_where(of.p, folds=True)
     check_thresholds(of.p)
     figure, (jump, ramp, law) = style.panels(10.0, 3.6, 1, 3)
-    t = np.linspace(0.0, min(_LASTS[0] / of.p.c, _LASTS[1] * math.sqrt(of.p.R / of.p.g)), 800)
-    rolls = response.step_response(_rolling(of), Case.RR, t)
-    jump.plot(t, rolls, color=style.COLOURS[Case.RR], lw=2, label="RR")
-    slips: dict[str, Any] = {"color": style.COLOURS[Case.SS], "lw": 1.8}
-    flows = [_slipping(of.p, share) for share in SHARES]
-    flows[0] = next((m.parameters for m in of.states if m.quantity == "jump_height"), flows[0])
-    for p, shade in zip(flows, (0.4, 0.7, 1.0), strict=True):
-        y = response.step_response(p, Case.SS, t) / response.transfer(p, Case.SS, 0.0).real
-        jump.plot(t, y, **slips, alpha=shade, label=f"SS, {p.omega_0:.3g} rad/s")
-    if of.motions:
-        up, down = (motion.load() for motion in of.motions[-2:])  # with the finer step
-        shown = np.flatnonzero(up.time <= t[-1])[::5]
-        jump.plot(up.time[shown], odd_part(up, down)[shown], "k.", ms=3.5, label="mujoco")
-    jump.set(xlabel="time after the jump (s)", ylabel="change of $\\omega_c$ / final change")
-    style.legend(jump)
-    (low, fold) = _ends_of_slipping(of.p)
+    _draw_jumps(jump, of)
     measured = [m for m in of.states if m.quantity == "ramp_end"]
-    p = measured[0].parameters if measured else flows[-1]
-    slipping(ramp, of.p, lambda slip_x, omega_c: omega_c)
+    p = measured[0].parameters if measured else _slipping(of.p, SHARES[-1])
+    low, fold = _ends_of_slipping(of.p)
     rates = np.array([0.002, 0.01, 0.04]) * p.c * (fold - low)
-    passed = []
-    start = analytic.solution(p, Case.SS)
-    last = _slipping(of.p, RAMP[1]).omega_0
-    for rate, shade in zip(rates.tolist(), (1.0, 0.65, 0.4), strict=True):
-        lasts = (last - p.omega_0) / rate
-        flow = Flow.ramp(p.omega_0, last, lasts)
-        run = analytic.simulate(p, start.x, lasts, flow, sample_interval=lasts / 5000, rtol=1e-6)
-        passed.append(caught_up(run) - fold)
-        name = f"rising by {rate:.2g} rad/s²"
-        ramp.plot(flow(run.time), run.omega_c, "k", alpha=shade, lw=1.5, label=name)
-    beyond = np.array([p.omega_0, last])
-    style.curve(ramp, Case.NR, beyond, beyond, ("NR", (0.9, (-5, 5))))
-    ramp.set(xlim=beyond, ylim=(0.7 * start.state.omega_c, 1.1 * last))
-    ramp.set(xlabel=style.OMEGA_0, ylabel=style.OMEGA_C)
-    style.guides(ramp, {"omega_04": fold})
+    passed = _draw_ramps(ramp, of.p, p, rates)
     slow = response.ramp_coefficient(of.p) * rates ** (2 / 3)
     law.loglog(rates, slow, color="0.4", ls="--", label="slow ramps")
     law.plot(rates, passed, color=style.COLOURS[Case.SS], lw=2, label="simulated")
@@ -166,6 +139,46 @@ def draw_unsteady(of: Diagram) -> tuple[Figure, str]:
         "ball's lag has halved; dashed: the law of slow ramps, 2.338 (ρ²/(ab))^(1/3).",
         states=measured,
     )
+
+
+def _draw_jumps(axes: Axes, of: Diagram) -> None:
+    """Draw how omega_c changes after a small jump of the flow, rolling and slipping."""
+    t = np.linspace(0.0, min(_LASTS[0] / of.p.c, _LASTS[1] * math.sqrt(of.p.R / of.p.g)), 800)
+    rolls = response.step_response(_rolling(of), Case.RR, t)
+    axes.plot(t, rolls, color=style.COLOURS[Case.RR], lw=2, label="RR")
+    slips: dict[str, Any] = {"color": style.COLOURS[Case.SS], "lw": 1.8}
+    flows = [_slipping(of.p, share) for share in SHARES]
+    flows[0] = next((m.parameters for m in of.states if m.quantity == "jump_height"), flows[0])
+    for p, shade in zip(flows, (0.4, 0.7, 1.0), strict=True):
+        y = response.step_response(p, Case.SS, t) / response.transfer(p, Case.SS, 0.0).real
+        axes.plot(t, y, **slips, alpha=shade, label=f"SS, {p.omega_0:.3g} rad/s")
+    if of.motions:
+        up, down = (motion.load() for motion in of.motions[-2:])  # with the finer step
+        shown = np.flatnonzero(up.time <= t[-1])[::5]
+        axes.plot(up.time[shown], odd_part(up, down)[shown], "k.", ms=3.5, label="mujoco")
+    axes.set(xlabel="time after the jump (s)", ylabel="change of $\\omega_c$ / final change")
+    style.legend(axes)
+
+
+def _draw_ramps(axes: Axes, whole: Parameters, p: Parameters, rates: Array) -> list[float]:
+    """Draw ramps from the flow of p at rates (n,), rad s-2, over the branch of SS of the set; how
+    far beyond the fold each has halved the lag, rad s-1."""
+    slipping(axes, whole, lambda slip_x, omega_c: omega_c)
+    start, last = analytic.solution(p, Case.SS), _slipping(whole, RAMP[1]).omega_0
+    (_, fold), passed = _ends_of_slipping(whole), []
+    for rate, shade in zip(rates.tolist(), (1.0, 0.65, 0.4), strict=True):
+        lasts = (last - p.omega_0) / rate
+        flow = Flow.ramp(p.omega_0, last, lasts)
+        run = analytic.simulate(p, start.x, lasts, flow, sample_interval=lasts / 5000, rtol=1e-6)
+        passed.append(caught_up(run) - fold)
+        name = f"rising by {rate:.2g} rad/s²"
+        axes.plot(flow(run.time), run.omega_c, "k", alpha=shade, lw=1.5, label=name)
+    beyond = np.array([p.omega_0, last])
+    style.curve(axes, Case.NR, beyond, beyond, ("NR", (0.9, (-5, 5))))
+    axes.set(xlim=beyond, ylim=(0.7 * start.state.omega_c, 1.1 * last))
+    axes.set(xlabel=style.OMEGA_0, ylabel=style.OMEGA_C)
+    style.guides(axes, {"omega_04": fold})
+    return passed
 
 
 def _measured(protocol: str, evidence: Evidence) -> Iterator[Measurement]:

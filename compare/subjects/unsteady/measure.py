@@ -39,7 +39,14 @@ from compare.kit.record import (
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.settling import rounded_duration, settle
 from compare.kit.statistics import COVERAGE, Estimate, estimate, peaks, top, uniform
-from compare.kit.step_pairs import Start, StepPair, carry_out, constrained, of_no_step
+from compare.kit.step_pairs import (
+    Start,
+    StepPair,
+    StepPairResult,
+    carry_out,
+    constrained,
+    of_no_step,
+)
 from compare.kit.tasks import Task
 from model import Case, Contact, Flow, Parameters, State, Trajectory
 from model.arrays import Array
@@ -401,19 +408,21 @@ def jumps(runner: Runner, sets: Sets, records: Records) -> Measured:
         else:
             pairs += _ramps(runner, begun, begins, ends)
     for result in carry_out(runner, pairs):
-        if isinstance(result, Missing):
-            yield result
-            continue
-        pair, coarse, fine = result.pair, result.coarse, result.fine
-        if pair.flow is None:
-            for quantity in ("jump_delay",) if pair.name == "RR" else ("jump_peak", "jump_height"):
-                row = result.row(quantity, of_no_step(coarse[quantity].value, fine[quantity]))
-                yield if_found(row, f"{quantity} in {pair.name}: no peak")
-        elif math.isfinite(coarse) and math.isfinite(fine):
-            yield result.row("ramp_end", of_no_step(coarse, estimate(fine)))
-        else:
-            ramp = f"a ramp of {pair.at['rate']:.3g} rad/s^2"
-            yield result.missing(f"{ramp} doesn't end slipping at both points")
+        yield from [result] if isinstance(result, Missing) else _rows(result)
+
+
+def _rows(result: StepPairResult) -> Measured:
+    """Measurements of a pair of jumps, or of a ramp."""
+    pair, coarse, fine = result.pair, result.coarse, result.fine
+    if pair.flow is None:
+        for quantity in ("jump_delay",) if pair.name == "RR" else ("jump_peak", "jump_height"):
+            row = result.row(quantity, of_no_step(coarse[quantity].value, fine[quantity]))
+            yield if_found(row, f"{quantity} in {pair.name}: no peak")
+    elif math.isfinite(coarse) and math.isfinite(fine):
+        yield result.row("ramp_end", of_no_step(coarse, estimate(fine)))
+    else:
+        ramp = f"a ramp of {pair.at['rate']:.3g} rad/s^2"
+        yield result.missing(f"{ramp} doesn't end slipping at both points")
 
 
 def _jump(runner: Runner, start: Start, size: float) -> StepPair:
