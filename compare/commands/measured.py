@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from analytic.bifurcation import diagram as bifurcation
 from analytic.flowmeter import measured, real_fluid
 from analytic.flowmeter.measured import Fit
 from compare.commands import options
@@ -33,7 +34,11 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"a measured curve needs its meter, {how}; motions come in two")
     (p,) = own.values()
     name, flow, read = curve(args.a)
-    found = measured.fits(p, flow, read)
+    bifurcation.check_branch(p)
+    try:
+        found = measured.fits(p, flow, read)
+    except InputError as error:
+        raise InputError(f"{args.a}: {error}") from error
     best = next((fit for fit in found[::-1] if fit.told), None)
     if args.plot:
         from compare.subjects.flowmeter import figures  # here, because drawing is slow to load

@@ -30,23 +30,24 @@ def run(args: argparse.Namespace) -> int:
     p, flow = options.parameters(args), running.flow(args)
     args.time = args.time or DURATION
     task = running.task(args, p, flow=flow)
-    # The first signal ends the run with its samples, the second without.
-    with tempfile.TemporaryDirectory() as scratch, signals.noted() as heard:
+    with tempfile.TemporaryDirectory() as scratch:
         as_table = options.is_table(args.output)
         path = Path(scratch) / "run.h5" if as_table or not args.output else args.output
-        failure = store(task, path, stop=lambda: bool(heard), tell=args.tell)
+        # The first signal ends the run with its samples, the second without.
+        with signals.noted() as heard:
+            failure = store(task, path, stop=lambda: bool(heard), tell=args.tell)
         path = failed_path(path) if failure else path
         kept = failed_path(args.output) if args.output and failure else args.output
         if as_table:
             table.write(kept, motions.labelled(storage.load(path)))
+        if failure:  # now, since a signal may come before all else is said
+            where = f"its samples so far are kept in {kept}"
+            where = where if args.output else "nothing is kept without --output"
+            print(f"dualball: the simulation {failure}; {where}", file=sys.stderr)
         about = motions.describe(path)
         options.show(about, args.json, motions.table(about))
         if args.output and not failure and not args.json:
             print(f"written to {args.output}")
-        if failure:
-            where = f"its samples so far are kept in {kept}"
-            where = where if args.output else "nothing is kept without --output"
-            print(f"dualball: the simulation {failure}; {where}", file=sys.stderr)
         return 128 + heard[0] if heard else 1 if failure else 0
 
 

@@ -24,6 +24,18 @@ from numba.core.compiler import Compiler
 from numba.core.types.functions import ExternalFunction
 from numba.experimental.function_type import _get_wrapper_address
 from numba.extending import intrinsic, register_jitable
+from numba.np import linalg
+
+
+def _no_blas() -> None:
+    raise ImportError("products of matrices are left to their own functions")
+
+
+# Numba loads scipy, which takes a quarter of a second, to see whether `np.convolve` could use it.
+_ensure_blas, linalg.ensure_blas = linalg.ensure_blas, _no_blas
+import numba.np.arraymath  # noqa: E402
+
+linalg.ensure_blas = _ensure_blas
 
 _OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": {"reassoc", "contract"}}
 

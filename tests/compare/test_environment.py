@@ -4,6 +4,7 @@ outputs, no home."""
 import ast
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -104,6 +105,17 @@ def test_closed_outputs_take_nothing_with_them(here, closed):
         assert dualball(here, "predict", "-o", str(path), before=before).returncode == 0
     assert made[0].read_bytes() == made[1].read_bytes()
     assert dualball(here, "predict", "--nonsense", before=closed).returncode == 2
+
+
+def test_no_file_takes_the_place_of_a_closed_output():
+    """Into which C libraries, and a signal's last words, write by its number."""
+    code = (
+        "import os\nfrom compare.__main__ import main\ntry:\n main()\n"
+        "except SystemExit:\n os._exit(os.open(os.devnull, os.O_RDONLY))"
+    )
+    line = shlex.join([sys.executable, "-c", code, "--version"])
+    done = subprocess.run(f"{line} <&- >&- 2>&-", shell=True, env={"PYTHONPATH": str(ROOT)})
+    assert done.returncode > 2
 
 
 def test_make_installs_all_that_readme_imports():

@@ -12,10 +12,13 @@ from pathlib import Path
 
 import pytest
 
-from compare.commands import signals
-from tests.commands import COMMANDS, started
+import mjsim
+from compare.commands import signals, simulate
+from model import Parameters
+from tests.commands import COMMANDS, carried_out, started
 
 SIGNALS = signal.SIGINT, signal.SIGTERM
+P = Parameters.named("reference")
 LONG = {
     "validate": "--quick --set reference --claim prop-1",
     "figures": "--format svg --format png --format pdf",
@@ -46,6 +49,14 @@ def catches(process, number):
         (line.split()[1] for line in status.splitlines() if line.startswith("SigCgt")), "f" * 16
     )
     return bool(int(caught, 16) >> (number - 1) & 1)
+
+
+@pytest.fixture(params=SIGNALS)
+def heard(request):
+    """A signal, also where a shell runs the tests in the background, and has SIGINT ignored."""
+    before = signal.signal(request.param, signal.SIG_DFL)
+    yield request.param
+    signal.signal(request.param, before)
 
 
 ALL = [
@@ -101,6 +112,32 @@ def test_every_command_ends_at_any_moment(stocked, tmp_path, command, number, af
     ]
 
 
+def test_what_a_stopped_run_leaves_is_told_whatever_comes_next(
+    capsys, monkeypatch, tmp_path, heard
+):
+    """Also where all that follows takes longer than a signal waits before it comes again."""
+
+    def describe(path):
+        time.sleep(1.5)
+        os.kill(os.getpid(), heard)
+
+    ended = simulate.store
+
+    def store(task, path, stop, tell):
+        os.kill(os.getpid(), heard)
+        return ended(task, path, stop=stop, tell=tell)
+
+    monkeypatch.setattr(signals, "_PATIENCE", 1.0)
+    monkeypatch.setattr(simulate, "store", store)
+    monkeypatch.setattr(simulate.motions, "describe", describe)
+    new = tmp_path / "new.h5"
+    mjsim.simulate(P, [0] * 6, t_end=0.01)  # is compiled
+    code, _, err = carried_out(capsys, "simulate", "--time", 100, "-o", new)
+    assert code == 128 + heard
+    (kept,) = tmp_path.iterdir()
+    assert f"kept in {kept}" in err
+
+
 INTERRUPTED = """
 import signal, time
 import analytic, mjsim
@@ -140,14 +177,6 @@ def test_ctrl_c_ends_every_long_call() -> None:
     names = ("event", "time-stepping", "many", "mjsim", "mjsim soft", "mjsim many", "attractors")
     assert done.stdout.splitlines() == [f"{name} True" for name in names]
     assert "Traceback" not in done.stderr
-
-
-@pytest.fixture(params=SIGNALS)
-def heard(request):
-    """A signal, also where a shell runs the tests in the background, and has SIGINT ignored."""
-    before = signal.signal(request.param, signal.SIG_DFL)
-    yield request.param
-    signal.signal(request.param, before)
 
 
 def test_a_signal_that_python_loses_comes_again(heard):
