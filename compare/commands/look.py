@@ -99,7 +99,7 @@ def render(args: argparse.Namespace) -> int:
 
     asked = {name: getattr(args, name) for name in ("at", "time", "speed", "rate")}
     asked = {name: value for name, value in asked.items() if value is not None}
-    print(page.save(storage.load(args.file), args.output, **asked))
+    print(page.save(storage.load(args.file), args.output, **asked, tell=args.tell))
     return 0
 
 

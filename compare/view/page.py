@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import base64
 import importlib.util
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -33,11 +34,13 @@ def save(
     time: float = 60.0,
     speed: float = 0.25,
     rate: float = 60.0,
+    tell: Callable[[float], object] = float,
 ) -> str:
     """Write the page of a run; return in words what was written.
 
     It begins at a time `at` of the run, plays at a multiple `speed` of real time with `rate` frames
-    a second, and takes `time`, less if the run ends before; all in s.
+    a second, and takes `time`, less if the run ends before; all in s. `tell` is called with the
+    fraction done.
 
     Raises `InputError` for what can't be shown, and where NiceGUI, an extra, isn't installed;
     `StorageError` if the file can't be written."""
@@ -55,15 +58,17 @@ def save(
             f"time, or a lower rate"
         )
     times = np.arange(at, until + 1e-12, step)
-    moves = frames(run, times)
+    moves = frames(run, times, tell)
     write_bytes(output, write(run.header.parameters, speed, moves, run).encode())
     return f"{output}: {len(times)} frames"
 
 
-def frames(run: Trajectory, times: Array) -> dict[str, Any]:
-    """What moves on the page, frame by frame, at times (n,) in s."""
+def frames(
+    run: Trajectory, times: Array, tell: Callable[[float], object] = float
+) -> dict[str, Any]:
+    """What moves on the page, frame by frame, at times (n,) in s; `tell` as in `save`."""
     p, now = run.header.parameters, resampled(run, times)
-    seen = geometry(run, now)
+    seen = geometry(run, now, tell)
     columns = [
         seen.centres / p.R, seen.turns.as_quat(),
         *(part[k] / p.R for k in range(2) for part in (seen.contacts, seen.forces, seen.slips)),
