@@ -22,7 +22,7 @@ EXCEPTIONS = {
     # doors for users, whose options have names and defaults
     *("analytic/simulation/ensemble.py:simulate_many", "analytic/simulation/simulator.py:simulate"),
     *("mjsim/engine.py:__init__", "mjsim/engine.py:simulate", "mjsim/engine.py:simulate_many"),
-    "compare/validation.py:validate",
+    *("compare/validation.py:validate", "compare/view/page.py:save"),
     *("analytic/flowmeter/design.py:best", "mjsim/coulomb/coulomb.py:__init__"),
     # compiled by numba, which takes numbers and arrays, and formulas in the form that is compiled
     "analytic/simulation/equations.py:forces",

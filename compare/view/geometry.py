@@ -18,7 +18,7 @@ from model.trajectory import columns
 
 STEP = 5e-3
 """Longest time between points of the rotation, s."""
-PART = 100_000
+AT_ONCE = 100_000
 """Points of it at a time, so that a run may be longer than memory."""
 ARROW = 3.0
 """Length of the arrows of a force m g and of the fastest slip of the run, in radii of the ball."""
@@ -40,9 +40,7 @@ class Geometry:
     """Velocities in the tangent plane, as arrows, m; none without a force."""
 
 
-def geometry(
-    run: Trajectory, now: Trajectory, tell: Callable[[float], object] = float
-) -> Geometry:
+def geometry(run: Trajectory, now: Trajectory, tell: Callable[[float], object] = float) -> Geometry:
     """Positions of ball, contacts and arrows at the samples of `now`, which is `run` resampled;
     `tell` is called with the fraction done."""
     p = run.header.parameters
@@ -91,8 +89,8 @@ def orientations(run: Trajectory, times: Array, tell: Callable[[float], object])
     wanted = np.searchsorted(points, times).clip(max=steps)
     turned = np.array([[0.0, 0.0, 0.0, 1.0]])
     found = [turned.repeat(np.sum(wanted == 0), axis=0)]
-    for first in range(0, steps, PART):
-        part = points[first : first + PART + 1]
+    for first in range(0, steps, AT_ONCE):
+        part = points[first : first + AT_ONCE + 1]
         middle = resampled(run, (part[1:] + part[:-1]) / 2)
         spin = to_world(middle.x, middle.theta, run.header.parameters).spin
         each = Rotation.from_rotvec(spin * np.diff(part)[:, None]).as_quat()

@@ -76,6 +76,16 @@ def test_a_ball_that_rolls_turns_about_its_contacts():
     )  # to the second order of the step
 
 
+def test_a_long_run_turns_part_by_part_and_says_how_far_it_is(run, monkeypatch):
+    whole, told = geometry.geometry(run, run).turns, list[float]()
+    monkeypatch.setattr(geometry, "AT_ONCE", 7)
+    parts = geometry.geometry(run, run, told.append).turns
+    assert np.abs((parts * whole.inv()).magnitude()).max() < 1e-12
+    assert told == sorted(told)
+    assert len(told) > 20
+    assert told[-1] == 1
+
+
 def test_a_run_is_shown_between_its_samples(run):
     k = int(np.flatnonzero(np.diff(run.case))[0])
     between = geometry.resampled(run, np.array([0.6 * run.time[k] + 0.4 * run.time[k + 1], 0.8]))
