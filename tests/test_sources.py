@@ -34,8 +34,6 @@ EXCEPTIONS = {
     "mjsim/mid_step.py:mid_step_forces",
     # what an exact case is made of
     "compare/bench/closed_forms.py:closed_form",
-    # a figure of two panels
-    "compare/subjects/unsteady/figures.py:draw_unsteady",
 }
 SAME = {
     # what every subject, file format, adapter or page has
