@@ -29,7 +29,7 @@ from compare.subjects.flowmeter.measure import BY_SPIN, UNLOADED, UPWARDS, first
 from model import Case, Contact, Trajectory
 from model.drag import QUADRATIC, STOKES
 
-_SIMULATED = "analytic.simulate"
+_SIMULATED, _UNLOADS = "analytic.simulate", "analytic.unloading_limit"
 RTOL = 1e-9
 """Relative tolerance of simulations: the speed of a landing is measured to 1e-6."""
 
@@ -57,6 +57,21 @@ def _only_rolling(m: Measurement) -> float:
     if case_of(m) not in lasting_cases(m.parameters) - ({Case.RR} if ended else set()):
         raise LookupError("beyond the range, rolling is not the only motion that lasts")
     return m.value
+
+
+def _range(m: Measurement) -> float:
+    """The flow up to which the meter can be used, rad s-1."""
+    return analytic.operating_range(m.parameters)
+
+
+def _unloads(m: Measurement) -> float:
+    """The flow from which on the wall carries a ball, rad s-1."""
+    return analytic.unloading_limit(m.parameters)
+
+
+def _rides_or_sinks(m: Measurement) -> float:
+    """NR where the wall carries a ball, else NS."""
+    return float(Case.NR if m.parameters.omega_0 > _unloads(m) else Case.NS)
 
 
 def _reads_flow(m: Measurement) -> float:
@@ -189,7 +204,7 @@ def _loop_reading_of_design(m: Measurement) -> float:
 
 
 _ENDS_OF_RANGES = (("omega_01", slips_first), ("omega_02", lifts_first))
-_DESIGN = "analytic.flowmeter.design"
+_DESIGN, _STABLE = "analytic.flowmeter.design", "analytic.stable_solutions"
 _WITHIN_TOLERANCES: tuple[Callable[[Measurement], float], ...] = (
     _worst,
     *(partial(_end_of_spread, end=k) for k in (0, 1)),
@@ -229,40 +244,20 @@ CLAIMS = (
         "Up to ω₀₁ (η < j) rolling is the only motion that lasts, up to ω₀₂ for η > j; beyond, "
         "from rest the ball slips (η < j), and on the wall it stays (η > j).",
         # Slipping on the floor no ball sinks.
-        Criterion(
-            "settled", "case", _only_rolling, when=all_of(from_floor, _does_not_sink, slips_first)
-        ),
-        Criterion("settled", "case", _only_rolling, when=all_of(_does_not_sink, lifts_first)),
-        Criterion("settled", "omega_c", _reads_flow, when=_does_not_sink),
         *(
-            Criterion(
-                "thresholds", end, lambda m: analytic.operating_range(m.parameters), when=first
-            )
-            for end, first in (("omega_01", slips_first), ("omega_02", lifts_first))
+            Criterion("settled", "case", _only_rolling, when=all_of(*whens))
+            for whens in ((from_floor, _does_not_sink, slips_first), (_does_not_sink, lifts_first))
         ),
+        Criterion("settled", "omega_c", _reads_flow, when=_does_not_sink),
+        *(Criterion("thresholds", end, _range, when=first) for end, first in _ENDS_OF_RANGES),
     ),
     claim(
         "unloading-limit",
         "Section 5.3, (85)",
         "The wall carries the ball at flows above ω₀₂, the limit at unloading; below, it slips and "
         "sinks.",
-        Criterion(
-            "settled",
-            "case",
-            lambda m: (
-                Case.NR
-                if m.parameters.omega_0 > analytic.unloading_limit(m.parameters)
-                else Case.NS
-            ),
-            when=given(start="on the wall"),
-        ),
-        Criterion(
-            "thresholds",
-            "omega_02",
-            lambda m: analytic.unloading_limit(m.parameters),
-            when=given(side="from above"),
-            by="analytic.unloading_limit",
-        ),
+        Criterion("settled", "case", _rides_or_sinks, when=given(start="on the wall")),
+        Criterion("thresholds", "omega_02", _unloads, when=given(side="from above"), by=_UNLOADS),
     ),
     claim(
         "fig-13-left",
@@ -270,9 +265,7 @@ CLAIMS = (
         "For η < j the ball jumps up to ω₀ above ω₀₄, down below ω₀₂, and keeps to its branch in "
         "between.",
         *(
-            Criterion(
-                "hysteresis", "case", _loop_case, when=_jumps(way), by="analytic.stable_solutions"
-            )
+            Criterion("hysteresis", "case", _loop_case, when=_jumps(way), by=_STABLE)
             for way in (1, -1, 0)
         ),
         Criterion("hysteresis", "omega_c", _loop_reading, by="(32), (38), (46)"),
@@ -315,21 +308,14 @@ CLAIMS = (
             for end, first in _ENDS_OF_RANGES
             for predict in _WITHIN_TOLERANCES
         ),
-        Criterion(
-            "thresholds", "omega_02", _by_sensitivity, by="analytic.flowmeter.design.sensitivities"
-        ),
+        Criterion("thresholds", "omega_02", _by_sensitivity, by=f"{_DESIGN}.sensitivities"),
     ),
     claim(
         "design-reading",
         "extension, Fig. 13",
         "Where a flow has several stable readings, the meter shows the lowest while the flow rises "
         "and the highest while it falls, as its design says.",
-        Criterion(
-            "hysteresis",
-            "omega_c",
-            _loop_reading_of_design,
-            by="analytic.flowmeter.design.readings",
-        ),
+        Criterion("hysteresis", "omega_c", _loop_reading_of_design, by=f"{_DESIGN}.readings"),
     ),
     claim(
         "time-constants",
@@ -341,7 +327,7 @@ CLAIMS = (
             "slowest_decay",
             lambda m: 1 / design.response_time(m.parameters),
             when=all_of(given(case="RR"), lambda m: m.parameters.drag != QUADRATIC),
-            by="analytic.flowmeter.design.response_time",
+            by=f"{_DESIGN}.response_time",
         ),
     ),
 )

@@ -105,6 +105,14 @@ def _motion(m: Measurement, leave_rolling: str = "slip-stability") -> Trajectory
     )
 
 
+def _rolls_or_motion(m: Measurement) -> float:
+    """RR where it is stable; else that of theory's motion, slipping at both points, or lifted."""
+    return Case.RR if _is_stable(Case.RR, m) else float(_motion(m).case[-1])
+
+
+_SMOOTH, _ROUGH = given(start="smooth wall"), given(start="rough floor")
+
+
 def _motion_either(m: Measurement) -> Trajectory:
     """Theory's motion, or the one that rolls as long as forces admit it, as measured.
 
@@ -194,31 +202,18 @@ LAW_CLAIMS = (
         "spins about its axis, "
         "as long as slip at the floor dies out, and friction suffices; faster, it slips.",
         *(
-            Criterion(
-                "runs",
-                "case",
-                partial(_rolls_or_slips, holds),
-                when=given(start="smooth wall"),
-                by=by,
-            )
+            Criterion("runs", "case", partial(_rolls_or_slips, holds), when=_SMOOTH, by=by)
             for holds, by in ((_is_stable, _HOLDS), (_exists, "analytic.stationary_solutions"))
         ),
-        Criterion("runs", "end_omega_c", _end_of_motion, when=given(start="smooth wall"), by=_RUN),
+        Criterion("runs", "end_omega_c", _end_of_motion, when=_SMOOTH, by=_RUN),
     ),
     claim(
         "definition-1-2",
         "Definitions 1 and 2, (82)",
         "On a floor so rough, μ > 1, that forces would allow a ball to jam between floor and wall "
         "and roll on beyond ω₀₁, a slight slip dies out at once below ω₀₁, and lasts above.",
-        # Where slip lasts, theory's motion ends slipping at both points, or lifted.
-        Criterion(
-            "runs",
-            "case",
-            lambda m: Case.RR if _is_stable(Case.RR, m) else float(_motion(m).case[-1]),
-            when=given(start="rough floor"),
-            by=_HOLDS,
-        ),
-        Criterion("runs", "end_omega_c", _end_of_motion, when=given(start="rough floor"), by=_RUN),
+        Criterion("runs", "case", _rolls_or_motion, when=_ROUGH, by=_HOLDS),
+        Criterion("runs", "end_omega_c", _end_of_motion, when=_ROUGH, by=_RUN),
     ),
     claim(
         "fluid-torque",
@@ -275,18 +270,14 @@ def _motion_criteria(case: Case) -> Iterator[Criterion]:
     def lift(m: Measurement) -> float:
         return slip_stability.lift_acceleration(case, case, state(m), m.parameters)
 
-    when = given(case=case.name)
+    field = partial(Criterion, "field", when=given(case=case.name))
     if case in (Case.NR, Case.NS):  # into which a ball lifts off
-        yield Criterion(
-            "field", "rate_v_y", lift, when=when, by="analytic.slip_stability.lift_acceleration"
-        )
+        yield field("rate_v_y", lift, by="analytic.slip_stability.lift_acceleration")
     for name in TRAITS[case].active:
         if name not in ("y", "h"):
-            yield Criterion("field", f"rate_{name}", rate, when=when, by="analytic.vector_field")
+            yield field(f"rate_{name}", rate, by="analytic.vector_field")
     for name in _FORCES:
-        yield Criterion(
-            "field", f"moving_force_{name}", force, when=when, by="analytic.contact_forces"
-        )
+        yield field(f"moving_force_{name}", force, by="analytic.contact_forces")
 
 
 EQUATIONS = tuple(

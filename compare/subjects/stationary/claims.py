@@ -106,13 +106,8 @@ def _along_branch(m: Measurement) -> float:
     """A contact force of SS in closed form at the flow, before the fold, N."""
     p = m.parameters
     branch = slipping_branch.branch(slipping_branch.points_at(p)[0], p)
-    return (
-        float(
-            {"force_Ay": branch.A_y, "force_Bx": branch.B_x, "force_Az": -branch.drag}[m.quantity]
-        )
-        * p.m
-        * p.g
-    )
+    loads = {"force_Ay": branch.A_y, "force_Bx": branch.B_x, "force_Az": -branch.drag}
+    return float(loads[m.quantity]) * p.m * p.g
 
 
 def _region(m: Measurement) -> Exists:
@@ -176,6 +171,11 @@ def _drag_at_birth(m: Measurement, equal: bool = False) -> float:
     if born.meets != ("omega_02", "omega_04"):
         raise LookupError("no fold is born")
     return float(p.c * (p.eta / born.eta) ** (1.5 if equal else 0.5))
+
+
+def _where_all_meet(m: Measurement) -> float:
+    """The flow at which all thresholds are one, rad s-1."""
+    return bifurcation.double_points(m.parameters)[-1].omega_0
 
 
 _ROLLS, _SLIPS, _LIFTED, _SINKS = (is_in(each) for each in (Case.RR, Case.SS, Case.NR, Case.NS))
@@ -370,12 +370,7 @@ DIAGRAMS = (
             when=lambda m: m.parameters.mu == m.parameters.eta,
             by=f"{_DOUBLE}, equal friction",
         ),
-        Criterion(
-            "thresholds",
-            "omega_03",
-            lambda m: bifurcation.double_points(m.parameters)[-1].omega_0,
-            by=_DOUBLE,
-        ),
+        Criterion("thresholds", "omega_03", _where_all_meet, by=_DOUBLE),
     ),
 )
 SECTIONS = {"Stationary states": CLAIMS, "Bifurcations": DIAGRAMS}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
+from functools import partial
 
 import analytic
 from analytic.flowmeter import pulsation, response
@@ -53,6 +54,19 @@ def _ramp_end(m: Measurement) -> Estimate:
     return integrated(end, end)
 
 
+def _fastest_flow(m: Measurement) -> float:
+    """The greatest flow at which the ball slips in a very slow pulsation about four fifths of it,
+    rad s-1."""
+    p = m.parameters.replace(omega_0=0.8 * m.parameters.omega_0)
+    return p.omega_0 + pulsation.slow_onset(p)
+
+
+def _flow_when_fast(m: Measurement) -> float:
+    """The greatest flow of a fast pulsation about the orbit when slip begins, rad s-1."""
+    p = m.parameters.replace(omega_0=m.at["omega_c"])
+    return p.omega_0 + pulsation.fast_onset(p)
+
+
 def _lowest_flow(m: Measurement) -> float:
     """Lowest flow (rad s-1) of a slow pulsation about a slow flow, when slip begins: 0, at rest."""
     p = m.parameters.replace(omega_0=0.1 * math.sqrt(m.parameters.g / m.parameters.R))
@@ -60,13 +74,19 @@ def _lowest_flow(m: Measurement) -> float:
 
 
 _BOTH, _ONE = "at both points", "at one point"
-_MEAN = f"{_BY}.pulsation.mean_error"
+_HELD = given(inner="RR", outer="RS", by="held")
+_SLOW, _FAST, _MEAN = (
+    f"{_BY}.pulsation.{function}" for function in ("slow_onset", "fast_onset", "mean_error")
+)
 
 
 def _mean_error(m: Measurement) -> Estimate:
     """The mean of omega_c in a pulsation less that of the flow, rad s-1."""
     value = theory(pulsation.mean_error, m.parameters, m.at["amplitude"], m.at["f"])
     return Estimate(value, pulsation.SETTLED * abs(m.parameters.omega_0))
+
+
+_mean = partial(Criterion, "pulsation", "mean_error")
 
 
 def _flow(m: Measurement) -> float:
@@ -108,39 +128,17 @@ CLAIMS = (
         "A slow pulsation makes the ball slip when the flow reaches ω₀₁ or ω₀₃, or falls to rest; "
         "in a fast one ω_c hardly changes, and the ball slips when the drag of the fluid alone is "
         "too strong.",
-        *(
-            Criterion(
-                "thresholds",
-                end,
-                # The greatest flow at which the ball slips in a very slow pulsation about four
-                # fifths of it.
-                lambda m: (
-                    0.8 * m.parameters.omega_0
-                    + pulsation.slow_onset(m.parameters.replace(omega_0=0.8 * m.parameters.omega_0))
-                ),
-                when=first,
-                by=f"{_BY}.pulsation.slow_onset",
-            )
-            for end, first in (("omega_01", slips_first), ("omega_03", lifts_first))
-        ),
+        Criterion("thresholds", "omega_01", _fastest_flow, when=slips_first, by=_SLOW),
+        Criterion("thresholds", "omega_03", _fastest_flow, when=lifts_first, by=_SLOW),
         Criterion(
             "bounds",
             "gamma_zero_square",
             lambda m: _lowest_flow(m) ** 2,
             when=given(inner="RR", outer="RS", by="stationary"),
             size=lambda m: m.parameters.g / m.parameters.R,
-            by=f"{_BY}.pulsation.slow_onset",
+            by=_SLOW,
         ),
-        Criterion(
-            "bounds",
-            "gamma_zero",
-            lambda m: (
-                m.at["omega_c"]
-                + pulsation.fast_onset(m.parameters.replace(omega_0=m.at["omega_c"]))
-            ),
-            when=given(inner="RR", outer="RS", by="held"),
-            by=f"{_BY}.pulsation.fast_onset",
-        ),
+        Criterion("bounds", "gamma_zero", _flow_when_fast, when=_HELD, by=_FAST),
     ),
     claim(
         "pulsation-mean",
@@ -148,13 +146,9 @@ CLAIMS = (
         "A pulsation that makes the ball slip at both points makes its mean reading low: on "
         "average its spin about the tangent takes drag. One that makes it slip at the wall alone "
         "does not change the mean, under Stokes' law.",
-        Criterion("pulsation", "mean_error", _mean_error, when=given(slips=_BOTH), by=_MEAN),
-        Criterion(
-            "pulsation", "mean_error", _mean_error, when=given(slips=_ONE), size=_flow, by=_MEAN
-        ),
-        Criterion(
-            "pulsation",
-            "mean_error",
+        _mean(_mean_error, when=given(slips=_BOTH), by=_MEAN),
+        _mean(_mean_error, when=given(slips=_ONE), size=_flow, by=_MEAN),
+        _mean(
             lambda m: 0.0,
             when=lambda m: m.at["slips"] == _ONE and m.parameters.drag == STOKES,
             size=_flow,
