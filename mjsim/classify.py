@@ -31,6 +31,9 @@ _R, _S, _N, _AS_BEFORE = range(4)
 _SATURATED, _FREE = 1e-6, 1e-4
 """How far from its Coulomb value friction may be for slipping, and must be for rolling,
 relative."""
+_ROUND_OFF = 1e-9
+"""Normal force, in weights of the ball, up to which a contact is open: what a solver leaves of
+none."""
 _SLIDES = 3.0
 """A sliding contact is faster than so many times the change of its speed in a step: ending slip
 changes faster."""
@@ -105,6 +108,7 @@ class Classifier:
         """States of the contacts (rolling, slipping, open) by each step alone, (steps, 2)."""
         normal, friction, speed, _ = contacts
         limit = self._coefficients * normal
+        closed = normal > _ROUND_OFF * self._p.m * self._p.g
         # A friction force of which one step can build up only a part leaves, while it changes
         # slowly, a creep far below the speed that belongs to all of it.
         load = self._coefficients * np.maximum(normal / self._p.m, self._p.g)
@@ -113,10 +117,10 @@ class Classifier:
         # A rotation that slips at both contacts alike while one of them holds is creep, too: the
         # load moves from one to the other, as it may where both roll, and slip would be stopped by
         # the one that holds.
-        held = ((normal > 0) & ~saturated)[..., ::-1] & (speed < _SHARED * speed[..., ::-1])
+        held = (closed & ~saturated)[..., ::-1] & (speed < _SHARED * speed[..., ::-1])
         slips = saturated & (speed > 3 * band) & ~held
         rolls = (friction < (1 - _FREE) * limit) | (speed < band) | held
-        return np.select([normal <= 0, slips, rolls], [_N, _S, _R], _AS_BEFORE)
+        return np.select([~closed, slips, rolls], [_N, _S, _R], _AS_BEFORE)
 
     def _lasting(self, shown: Array) -> Array:
         """The states of the contacts that last, (steps + 1, 2): before these steps, and in each of

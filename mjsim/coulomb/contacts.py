@@ -336,34 +336,45 @@ def match(model: Any, data: Any, memory: Any) -> float:
 
 @kernel
 def inherit(model: Any, data: Any, memory: Any, contact: Any, old: Any) -> None:
-    """Take over what a contact before remembers; of several their loads and friction add up."""
-    alone = contact.state == NEW
+    """Take over what a contact before remembers; of several their loads and friction add up.
+
+    Friction turns with its bodies, most with the one that turns less: where one rolls on another
+    that is at rest, friction stays as it is.
+    """
+    alone, spins = contact.state == NEW, (spin(model, data, old, 0), spin(model, data, old, 1))
+    both = spins[0] + spins[1]
     contact.bias = old.bias if alone else 0.0
-    fixed = alone and is_fixed(model, data, memory, old)
+    fixed = alone and is_fixed(model, memory, old, max(spins))
     for axis in range(3):  # one that wanders over its bodies, or is made of several, has no speed
         contact.speed[axis] = old.speed[axis] if fixed else math.inf
     contact.state = max(contact.state, old.state)
     contact.error, contact.lift = max(contact.error, old.error), max(contact.lift, old.lift)
     contact.load += old.load
     for side in range(2):
+        share = spins[1 - side] / both if both > 0 else 0.5
         for axis in range(3):
             for of in range(3):
-                half = contact.axes[side, axis, of] / 2
+                part = share * contact.axes[side, axis, of]
                 for kind in range(2):
-                    contact.carried[of, kind] += half * old.friction[side, axis, kind]
+                    contact.carried[of, kind] += part * old.friction[side, axis, kind]
 
 
 @kernel
-def is_fixed(model: Any, data: Any, memory: Any, old: Any) -> bool:
+def spin(model: Any, data: Any, contact: Any, side: int) -> float:
+    """How fast one of the bodies in contact turns, rad/s."""
+    bodies, velocities = integers(model.geom_bodyid, model.ngeom), reals(data.cvel, 6 * model.nbody)
+    first = 6 * bodies[contact.geoms[side]]
+    x, y, z = velocities[first], velocities[first + 1], velocities[first + 2]
+    return math.sqrt(x**2 + y**2 + z**2)
+
+
+@kernel
+def is_fixed(model: Any, memory: Any, old: Any, turning: float) -> bool:
     """Whether a contact has moved on its bodies by no more than it creeps, and they don't roll."""
-    bodies, spins = integers(model.geom_bodyid, model.ngeom), reals(data.cvel, (model.nbody, 6))
-    creep, turning = 0.0, 0.0
+    creep = 0.0
     for axis in range(3 if old.state == STICKS else 0):
         creep += old.speed[axis] ** 2
-    for side in range(2):
-        spin = spins[bodies[old.geoms[side]]]
-        turning = max(turning, spin[0] ** 2 + spin[1] ** 2 + spin[2] ** 2)
-    rolled = memory.law.fixed * math.sqrt(turning) * smaller_radius(model, old)
+    rolled = memory.law.fixed * turning * smaller_radius(model, old)
     return bool(old.moved <= 2 * (model.opt.timestep * (rolled + math.sqrt(creep))) ** 2)
 
 

@@ -62,7 +62,7 @@ CONTACT = np.dtype(
     ],
     align=True,
 )
-"""A contact; friction turns with its bodies, and is the mean of what both remember."""
+"""A contact; friction turns with its bodies, most with the one that turns less."""
 
 _names: Any = CONTACT.names
 REMEMBERED = _names[: _names.index("index")]
