@@ -122,7 +122,10 @@ def read(source: Source, name: str = "") -> Series:
                 f"{name} must be (time, omega_c), arrays by name, a file or a trajectory"
             ) from error
     given = {"time" if key == "t" else key: values for key, values in given.items()}
-    known = {key: _column(name, key, given[key]) for key in given if key in UNITS}
+    try:
+        known = {key: _column(key, given[key]) for key in given if key in UNITS}
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from error
     if "time" not in known or not known.keys() & UNITS.keys() - {"time"}:
         raise InputError(
             f"{name} needs time and, say, omega_c; it has "
@@ -131,19 +134,16 @@ def read(source: Source, name: str = "") -> Series:
     return Series(name, known.pop("time"), known, run)
 
 
-def _column(source: str, name: str, values: Any) -> Array:
+def _column(name: str, values: Any) -> Array:
     """The values of a quantity; `InputError` for no numbers, or another unit."""
     about = getattr(values, "attrs", {})  # of a data set of HDF5, and of an array of xarray
     for unit in [about[key] for key in ("units", "unit") if key in about][:1]:
         said = unit.decode("utf-8", "replace") if isinstance(unit, bytes) else str(unit)
-        try:
-            table.check_unit(name, name, said, UNITS[name])
-        except InputError as error:
-            raise InputError(f"{source}: {error}") from error
+        table.check_unit(name, name, said, UNITS[name])
     try:
         return np.asarray(values, float)
     except (TypeError, ValueError) as error:
-        raise InputError(f"{source}: {name} must be a column of numbers") from error
+        raise InputError(f"{name} must be a column of numbers") from error
 
 
 def _hdf5(path: Path) -> Trajectory | dict[str, Array]:
@@ -166,7 +166,7 @@ def _hdf5(path: Path) -> Trajectory | dict[str, Array]:
                     most = f"{SAMPLES:g} are the most that are compared"
                     raise StorageError(f"{name!r} has {len(stored):g} samples, and {most}")
             return {
-                name: _column(str(path), "time" if name == "t" else name, stored)
+                name: _column("time" if name == "t" else name, stored)
                 for name, stored in found.items()
             }
     raise ours

@@ -53,10 +53,12 @@ class _Pace:
     def note(self, done: int, total: int) -> bool:
         """Note how much is done; return whether that is the first to go by.
 
-        What an earlier session did, or getting ready, is no measure of how fast this is."""
+        What an earlier session did, getting ready, or another part, of which there are more or
+        fewer, is no measure of how fast this is."""
+        first = self._before < 0 or not total or total != self._total
         if (done, total) != (self._done, self._total):
             self._said, self._done, self._total = time.monotonic(), done, total
-        if first := self._before < 0 or not total:
+        if first:
             self._began, self._before = time.monotonic(), done
         return first
 

@@ -350,8 +350,8 @@ def _heading(ui: Any) -> None:
     ui.html("<h1>A ball that a fluid takes round in a vessel</h1>", sanitize=False).classes("title")
     about = (
         "It touches the floor and the wall. A case has a letter for each: R rolls, S slips, N does "
-        "not touch. Left: move a slider. Middle: which steady motions theory has. Right: the "
-        "motion, simulated anew. The address holds what you set: to share it, copy the link."
+        "not touch. Move a slider, and see which steady motions theory has, and the motion, "
+        "simulated anew. The address holds what you set: to share it, copy the link."
     )
     ui.html(f"<p>{about}</p><p>{LIMITS}</p>", sanitize=False).classes("text-sm about")
     ui.add_css(".title h1 { font-size: 1.5rem; line-height: 1.3; margin: 0 }")

@@ -143,8 +143,9 @@ def test_another_unit_is_refused_wherever_it_is_said(tmp_path, theory, unit):
         if own is not unit:
             assert_tracks(path, theory, rms=1e-15)
             continue
-        with pytest.raises(InputError, match=f"omega_c must be in rad/s, not in {said}"):
+        with pytest.raises(InputError, match=f"omega_c must be in rad/s, not in {said}") as told:
             read(path)
+        assert str(told.value).count(path.name) == 1
     series = xarray.DataArray(theory.omega_c, attrs={"units": said})
     with pytest.raises(InputError, match=f"omega_c must be in rad/s, not in {said}"):
         assert_settles(theory.time, series, P, rtol=1e-3)

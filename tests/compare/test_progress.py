@@ -64,6 +64,17 @@ def test_silence_between_two_parts_is_no_sign_that_they_are_slow(monkeypatch):
     assert pace.left() == pytest.approx(100.0 - now)
 
 
+def test_another_part_has_a_pace_of_its_own(monkeypatch):
+    now = 0.0
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now)
+    pace = progress._Pace()
+    for total, takes in ((10, 1.0), (20, 5.0)):
+        for done in range(5):
+            pace.note(done, total)
+            now += takes
+    assert pace.left() == pytest.approx(16 * 5.0 - 5.0)
+
+
 def test_what_is_shown_is_what_is_being_measured_on_a_short_line():
     said = []
     far = progress.ValidationProgress(lambda what, *_: said.append(what), 30)

@@ -120,7 +120,8 @@ def basins(
     ]  # fmt: skip
     fine, other = [], []
     threads = max(1, campaign.workers) if isinstance(campaign.workers, int) else None
-    for row in states:
+    for k, row in enumerate(states):
+        campaign.report(f"{campaign.doing}, by theory", k * len(x), len(y) * len(x), 0)
         runs = analytic.simulate_many(
             p, row, lasts, sample_interval=lasts / INSTANTS, threads=threads
         )
