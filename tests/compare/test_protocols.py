@@ -604,3 +604,15 @@ def test_where_hopping_begins_and_ends():
         [0.08, 0.09, 0.11], [(0.97, 0.96, 0.96), (0.99, 0.98, 0.98), (1.03, 1.02, 1.02)]
     )
     assert (place.value, place.uncertainty) == pytest.approx((0.1025, 5e-3 / math.sqrt(12)))
+
+
+def test_a_swing_is_measured_although_loads_are_rough() -> None:
+    """A ripple of a thousandth has more tops than the swing, whose period they then gave."""
+    time = np.arange(0.0, 6.0, 2e-3)
+    rough = 1e-4 * np.random.default_rng(1).choice([-1.0, 1.0], len(time))
+    omega_c = 22.4 + 0.05 * np.sin(2 * np.pi * time / 0.33)
+    run = SimpleNamespace(time=time, omega_c=omega_c + rough, theta=22.4 * time)
+    period, mean, size = attractors._swing(run, 1.0)
+    assert period == pytest.approx(0.33, rel=3e-4)
+    assert mean == pytest.approx(22.4, rel=1e-9)
+    assert size == pytest.approx(0.1, rel=5e-3)

@@ -19,6 +19,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -61,6 +62,8 @@ SWINGING = 24.0
 """How long a ball swings, s."""
 SWUNG = 4.0
 """The last part of a swing that is measured, s."""
+PARTS = 128
+"""Times of a swing for which omega_c is averaged."""
 
 
 def recurrent(runner: Runner, sets: Sets, records: Records) -> Measured:
@@ -308,11 +311,16 @@ def _swing(run: Trajectory, start: float) -> tuple[float, float, float]:
     """Period, mean and size of the swing of omega_c in the part of a run after a time."""
     inside = (run.time > start) & (run.time <= start + SWUNG)
     time, omega_c = run.time[inside], run.omega_c[inside]
-    (k, late), (low, lower) = peaks(omega_c), peaks(-omega_c)
+    # where it rises through its middle: tops are too flat to tell a time where loads are rough
+    middle = (omega_c.min() + omega_c.max()) / 2
+    k = np.flatnonzero((omega_c[:-1] < middle) & (omega_c[1:] >= middle))
+    late = (middle - omega_c[k]) / (omega_c[k + 1] - omega_c[k])
     at = time[k] + late * (time[1] - time[0])
     span, turn = at[-1] - at[0], np.diff(np.interp(at[[0, -1]], run.time, run.theta))[0]
-    size = np.mean(top(omega_c, k, late)) - np.mean(top(omega_c, low, lower))
-    return float(span / (len(at) - 1)), float(turn / span), float(size)
+    periods = [
+        np.interp(np.linspace(*ends, PARTS), time, omega_c) for ends in pairwise(at.tolist())
+    ]
+    return float(span / len(periods)), float(turn / span), float(np.ptp(np.mean(periods, axis=0)))
 
 
 def calm(runner: Runner, sets: Sets, records: Records) -> Measured:
