@@ -220,7 +220,8 @@ def carry_out(job: Job, before: Records) -> Records:
         records = Records.of(rows)
         said = {row.set for row in rows}
         if said <= job.sets.keys():  # else the protocol has sets of its own
-            silent = (Planned(protocol.name, name, "") for name in job.sets if name not in said)
+            asked = [name for name in job.sets if not entry.only or name in entry.trial]
+            silent = (Planned(protocol.name, name, "") for name in asked if name not in said)
             records = replace(records, planned=records.planned + Counter(silent))
         campaign.keep(
             {run.rpartition("/")[2] for m in records.measurements for run in m.runs if "/" in run}

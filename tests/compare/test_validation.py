@@ -11,7 +11,7 @@ from compare.claim import Criterion, Outcome, Verdict
 from compare.kit import programme, record
 from compare.kit.engines import EVENT, MUJOCO
 from compare.kit.levels import Level
-from compare.kit.plan import PLAN, Entry
+from compare.kit.plan import ONE_BALL, PLAN, Entry
 from compare.kit.programme import UNDAMPED, Job, Protocol
 from compare.kit.record import Check, Missing, Records
 from compare.report import results
@@ -203,6 +203,19 @@ def test_a_set_of_which_nothing_is_said_is_counted(tmp_path, runner, monkeypatch
 
     found = programme.carry_out(Job(Protocol("round", measure), runner, tmp_path, named), Records())
     assert found.lost == {("round", "third", ""): 1}
+
+
+def test_what_only_the_reference_shows_is_not_missed_on_other_sets(tmp_path, runner, monkeypatch):
+    """All sets are planned at the default level: its claims came out inconclusive."""
+    monkeypatch.setitem(PLAN, "round", Entry(ONE_BALL, only="it is that of the reference"))
+    named = {name: Parameters.named("reference") for name in ("reference", "other")}
+
+    def measure(runner, sets, before):
+        yield from going_round(runner, {"reference": sets["reference"]}, before)
+
+    found = programme.carry_out(Job(Protocol("round", measure), runner, tmp_path, named), Records())
+    assert found.measurements
+    assert not found.lost
 
 
 def test_another_engine_may_measure_and_what_only_the_reference_shows_is_missing_without_it(
