@@ -53,5 +53,5 @@ def suggestion(name: str, known: Iterable[str]) -> str:
         return "".join(of[-1].lower() if of[:1] == ["GREEK"] else letter for letter, of in names)
 
     spelled = {plain(each): each for each in known}
-    near = difflib.get_close_matches(plain(name), list(spelled), n=1)
+    near = difflib.get_close_matches(plain(str(name)), list(spelled), n=1)
     return f" (did you mean {spelled[near[0]]!r}?)" if near else ""

@@ -321,7 +321,7 @@ def calibrate(parser: Parser) -> None:
     parser.add_argument("--swirl", type=Number("rad m-3", Range(1e-9, 1e12)), help=known)
     ends = (("slowest", "above 0"), ("fastest", "a quarter beyond the last threshold"))
     for end, usual in ends:
-        flow = Number("FLOW", Range(1e-12, 1e12))
+        flow = Number("rad s-1 or m3 s-1", Range(1e-12, 1e12))
         parser.add_argument(f"--{end}", type=flow, help=f"{end} flow (default: {usual})")
     points = Number(allowed=Range(2, 1000, whole=True))
     parser.add_argument("--count", type=points, default=60, help="flows between them")

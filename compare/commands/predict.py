@@ -128,10 +128,7 @@ def reading(p: Parameters) -> str:
     if len(cases) == 1 and cases[0] not in (Case.SR, Case.NR):
         lag = 1 - attractors[0].state.omega_c / p.omega_0
         return f"the ball slips ({cases[0].name}) and lags {100 * lag:.1f} % behind the fluid"
-    return (
-        f"ambiguous: {', '.join(c.name for c in cases)} all attract, the reading depends on the "
-        "history"
-    )
+    return f"the reading depends on the past: {', '.join(c.name for c in cases)} all attract"
 
 
 Digits = Callable[[float, int], str]

@@ -35,6 +35,8 @@ from model.versions import current_versions
 
 BATCH = 64
 """Most runs that a process takes at once, and stores in one file."""
+MOST_STEPS = 3e5
+"""Of a batch of several runs: some seconds, so that it is told how far they are."""
 HELD = 2**16
 """Most samples of a batch, some 11 MB; a run with more is written as it comes."""
 READ = 2**18
@@ -257,10 +259,12 @@ class Campaign:
     def _carry_out(self, todo: Sequence[Task]) -> Iterator[tuple[list[Task], list[Ended]]]:
         """Yield each batch of tasks that ends, with what became of them.
 
-        Tasks are shared out evenly among the workers, the longest first: then all end together. A
+        Tasks are shared out evenly among the workers, the longest first: then all end together;
+        no batch of several has more than `MOST_STEPS`. A
         worker that dies takes all batches under way with it. Their tasks are tried again at the
         end, one at a time; one that then loses its worker twice has failed."""
-        fresh, share = deque[list[Task]](), sum(task.steps for task in todo) / self.fleet.count
+        fresh = deque[list[Task]]()
+        share = min(sum(task.steps for task in todo) / self.fleet.count, MOST_STEPS)
         steps, samples = 0.0, 0.0  # of the batch that grows: the sum, and the most of a run
         for task in sorted(todo, key=lambda task: -task.steps):
             steps, samples = steps + task.steps, max(samples, task.samples)

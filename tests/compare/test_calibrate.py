@@ -80,6 +80,7 @@ def test_what_the_model_leaves_out_stands_beside_each_flow(tmp_path, capsys):
         ("--omega-0 3", "--omega-0 has no effect"),
         ("--fastest 3 --slowest 4", "--fastest 3 rad/s is out of range: must be > --slowest 4"),
         ("--swirl 5e4 --fastest 3e-5 --slowest 4e-5", "--fastest 3e-05 m³/s is out of range"),
+        ("--slowest 0", "--slowest: 0 rad/s or m³/s is out of range: it must be >= 1e-12"),
         ("--swirl 1e12 --fastest 1e12", "--fastest times --swirl = 1e+24 rad/s is out of range"),
     ],
 )

@@ -96,6 +96,15 @@ def test_no_more_is_held_than_there_is_memory_for(tmp_path, monkeypatch):
         loaded.clear()
 
 
+def test_it_is_told_how_far_long_runs_are(tmp_path, monkeypatch, undisturbed):
+    """Also where all of them would fit into one batch."""
+    told = list[int]()
+    monkeypatch.setattr("compare.kit.campaign.MOST_STEPS", 2.5 * tasks()[0].steps)
+    completed(tmp_path, report=lambda what, done, total, failed: told.append(done))
+    assert told == [*range(0, len(tasks()), 2), len(tasks())]
+    assert data(tmp_path) == undisturbed
+
+
 def test_what_is_measured_is_reduced_to_what_is_drawn(tmp_path):
     with Campaign(tmp_path, workers=0, batch=2, label="first") as campaign:
         campaign.complete([*tasks(3), WILD])

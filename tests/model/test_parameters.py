@@ -182,3 +182,9 @@ def test_files_that_cannot_be_read_or_written(tmp_path):
         Parameters.load(tmp_path / "binary.toml")
     with pytest.raises(StorageError, match="cannot write"):
         REFERENCE.save(tmp_path / "absent" / "p.toml")
+
+
+def test_what_is_no_name_names_no_set():
+    for name in (3, None, b"reference"):
+        with pytest.raises(InputError, match="no parameter set is named"):
+            Parameters.named(name)

@@ -30,7 +30,7 @@ def readable(unit: str) -> str:
         ("rad-1", "1/rad"),
     ):
         unit = unit.replace(written, read)
-    return unit.replace("m2", "m²").replace("rad2", "rad²")
+    return unit.replace("m2", "m²").replace("m3", "m³").replace("rad2", "rad²")
 
 
 _SIGNS = {
