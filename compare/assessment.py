@@ -17,7 +17,7 @@ from statistics import median
 
 from compare.claim import Claim, EngineVerdict, Outcome, Verdict
 from compare.convergence import Ends, zero_step_limits
-from compare.judge import checks_of, lost_to, outcome, per_criterion, undecided_criteria, verdict
+from compare.judge import checks_of, inconclusive_criteria, lost_to, outcome, per_criterion, verdict
 from compare.kit.engines import Engine, engine
 from compare.kit.quantities import quantity
 from compare.kit.record import Check, Measurement, Missing, Records, RecordsByEngine, Relation
@@ -62,7 +62,7 @@ def assess(
     trial has some, one, or one for each set that was asked of both.
 
     Nothing, where theory breaks down, or no protocol of the claim was asked of it. Else it leaves
-    the claim undecided where too few of its numbers can tell, those without a limit among them."""
+    the claim inconclusive where too few of its numbers can tell; without a limit none can."""
     given = _Given(claim, steps)
     try:
         found = {n: checks_of(claim, own) for n, own in steps.items()}
@@ -158,7 +158,7 @@ def _too_few(
     claim: Claim, checks: Sequence[Check], wanted: Counter[int], missing: Sequence[Missing]
 ) -> str:
     """In words of which criteria too few numbers can tell, and why; empty if of none."""
-    if not (few := undecided_criteria(checks, wanted)):
+    if not (few := inconclusive_criteria(checks, wanted)):
         return ""
     symbols: dict[str, list[str]] = {}
     for n, told in sorted(few.items()):

@@ -175,7 +175,7 @@ class EngineVerdict(Judged):
 
     engine: str
     reason: str = ""
-    """Why it was not asked, or leaves the claim undecided."""
+    """Why it was not asked, or leaves the claim inconclusive."""
     order: float = math.nan
     """Median of the orders with which the numbers converge; nan where the step shows nothing."""
     deviations: tuple[float, ...] = ()

@@ -113,7 +113,7 @@ def outcome(
     """The outcome of a claim by its checks, of which so many were wanted: see `verdict`."""
     if not all(check.agrees for check in checks):
         return Outcome.REFUTED
-    if undecided_criteria(checks, wanted):
+    if inconclusive_criteria(checks, wanted):
         return Outcome.INCONCLUSIVE
     if not checks or (claim.numbers and claim.numbers.isdisjoint(per_criterion(checks))):
         return Outcome.NOT_RUN
@@ -136,7 +136,7 @@ def per_criterion(checks: Iterable[Check]) -> Counter[int]:
     return Counter(check.criterion for check in checks)
 
 
-def undecided_criteria(checks: Iterable[Check], wanted: Counter[int]) -> dict[int, int]:
+def inconclusive_criteria(checks: Iterable[Check], wanted: Counter[int]) -> dict[int, int]:
     """Criteria of which too few of the checks that are wanted can tell, and how many can."""
     told = per_criterion(check for check in checks if check.conclusive)
     return {n: told[n] for n, count in wanted.items() if told[n] < ENOUGH * count}

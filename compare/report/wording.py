@@ -237,13 +237,13 @@ def _subjects(ran: Sequence[Verdict], engine: str) -> dict[str, Any]:
 
 
 def headline(ran: Sequence[Verdict]) -> str:
-    """All verdicts in a sentence: what failed or is undecided, or that all agrees."""
+    """All verdicts in a sentence: what failed or is inconclusive, or that all agrees."""
     parts, bad = [], [verdict for verdict in ran if not verdict.passed]
-    undecided = [verdict.claim.id for verdict in bad if verdict.outcome is Outcome.INCONCLUSIVE]
+    inconclusive = [verdict.claim.id for verdict in bad if verdict.outcome is Outcome.INCONCLUSIVE]
     failed = [verdict.claim.id for verdict in bad if verdict.outcome is not Outcome.INCONCLUSIVE]
     for what, ids in (
         ("did not come out as expected", failed),
-        ("can't be told from what was measured", undecided),
+        ("can't be told from what was measured", inconclusive),
     ):
         more = f" and {len(ids) - 4} more" if len(ids) > 4 else ""
         parts += [f"{len(ids)} of {len(ran)} claims {what}: {', '.join(ids[:4])}{more}"] * bool(ids)

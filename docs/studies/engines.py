@@ -52,7 +52,7 @@ def counted(results: Path) -> Rows:
         "to",
         "at worst",
         "refuted",
-        "undecided",
+        "inconclusive",
         "typical deviation",
         "worst",
     ]
@@ -70,7 +70,7 @@ def counted(results: Path) -> Rows:
 
 def verdict(results: Path) -> Rows:
     """What README tells of each engine: how many of the claims that it was asked came out how."""
-    rows = [["engine", "confirmed", "refuted", "undecided"]]
+    rows = [["engine", "confirmed", "refuted", "inconclusive"]]
     for row in wording.engines(verdicts(results)):
         falsely = sum(not expected for expected in row["refuted"].values())
         due = len(row["refuted"]) - falsely
