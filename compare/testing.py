@@ -18,7 +18,7 @@ from compare.kit.scales import rotation_scale
 from compare.kit.steady import time_constant
 from model import Case, InputError, Parameters, StorageError, Trajectory, storage, table
 from model.arrays import Array
-from model.errors import suggestion
+from model.errors import check_type, suggestion
 from model.hdf5 import dataset, reading
 from model.parameters import POSITIVE, check_number
 from model.trajectory import COMPONENTS, columns, component
@@ -141,9 +141,11 @@ def _column(name: str, values: Any) -> Array:
         said = unit.decode("utf-8", "replace") if isinstance(unit, bytes) else str(unit)
         table.check_unit(name, name, said, UNITS[name])
     try:
-        return np.asarray(values, float)
+        if not np.iscomplexobj(values):
+            return np.asarray(values, float)
     except (TypeError, ValueError) as error:
         raise InputError(f"{name} must be a column of numbers") from error
+    raise InputError(f"{name} must be a column of real numbers")
 
 
 def _hdf5(path: Path) -> Trajectory | dict[str, Array]:
@@ -288,6 +290,7 @@ def assert_settles(
         that is taken along from rest, (1 + 2 j)/c with the c of its lag in the state, and no less
         than Stokes'."""
     check_number("rtol", rtol, "1", POSITIVE)
+    check_type("p", p, Parameters)
     motion = read((time, omega_c))
     if isinstance(case, str) and case not in Case.__members__:
         raise InputError(f"there is no case {case!r}; there are {', '.join(Case.__members__)}")

@@ -14,6 +14,7 @@ from analytic.bifurcation.diagram import number_of_folds
 from analytic.flowmeter import response
 from analytic.slipping import slip_bounds, slip_stability
 from analytic.stationary.slipping_branch import hopf_places
+from compare.testing import assert_settles, read
 from mjsim import ContactSettings, RigidContacts
 from mjsim import simulate_many as many
 from model import Case, Flow, InputError, Parameters, State
@@ -43,7 +44,8 @@ TAKE_A_SET = (
     analytic.attractors,
     analytic.thresholds,
     analytic.stationary_solutions,
-    analytic.operating_range,
+    *(analytic.operating_range, analytic.reading_range, analytic.mean_slope, analytic.slope_jump),
+    lambda p: assert_settles([0, 1], [1, 1], p, rtol=0.1),
     lambda p: analytic.vector_field("RR", State(), p),
     lambda p: analytic.simulate(p, AT_REST, 1.0),
     lambda p: mjsim.simulate(p, AT_REST, 1.0),
@@ -52,6 +54,8 @@ TAKE_A_SET = (
 REFUSED = [
     # of another type
     *((lambda f=f: f(WORDS), "^p must be Parameters, not dict$") for f in TAKE_A_SET),
+    (lambda: analytic.slowest_time_constant(P), "^of must be StationarySolution, not Parameters$"),
+    (lambda: read(([0, 1], [1j, 1])), "omega_c must be a column of real numbers$"),
     (lambda: analytic.simulate(P, "rest", 1.0), "^a state must be numbers, not 'rest'$"),
     (lambda: analytic.simulate(P, AT_REST, 1.0, 25.0), "^flow must be Flow, not float$"),
     (lambda: runs(settings="fast"), "^settings must be Settings, not str$"),

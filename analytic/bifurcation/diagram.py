@@ -113,6 +113,7 @@ def critical_drag(p: Parameters) -> float:
 
 def check_branch(p: Parameters) -> None:
     """`InputError` unless SS has a branch from RR to SR: 0 < eta < j, mu > 0 and c > 0."""
+    check_type("p", p, Parameters)
     if not (0 < p.eta < p.j and p.mu > 0 and p.c > 0):
         raise InputError(
             f"eta = {p.eta:g} is out of range: SS has a branch from RR to SR for 0 < eta < j = "

@@ -66,6 +66,7 @@ def reading_range(p: Parameters) -> float:
 
     omega_01 for eta < j. inf for eta >= j, where RR, SR and NR all go round with the fluid, and on
     a smooth floor, which can't hold the ball back. 0 without drag."""
+    check_type("p", p, Parameters)
     if p.c == 0:
         return 0.0
     return bifurcation.thresholds(p).omega_01 if p.eta < p.j and p.mu > 0 else np.inf

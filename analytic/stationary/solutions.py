@@ -151,6 +151,7 @@ def stable_solutions(p: Parameters, sinking: bool = False) -> list[StationarySol
 def slowest_time_constant(of: StationarySolution) -> float:
     """Slowest time constant in s of the disturbances that die out within the case; inf if none does
     exponentially."""
+    check_type("of", of, StationarySolution)
     if of.stability is Stability.ALGEBRAIC:
         return np.inf
     rates = -of.eigenvalues.real
