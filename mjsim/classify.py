@@ -32,8 +32,7 @@ _SATURATED, _FREE = 1e-6, 1e-4
 """How far from its Coulomb value friction may be for slipping, and must be for rolling,
 relative."""
 _ROUND_OFF = 1e-9
-"""Normal force, in weights of the ball, up to which a contact is open: what a solver leaves of
-none."""
+"""Normal force, in weights, up to which a contact is open: what a solver leaves of none."""
 _SLIDES = 3.0
 """A sliding contact is faster than so many times the change of its speed in a step: ending slip
 changes faster."""

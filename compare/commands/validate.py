@@ -172,10 +172,9 @@ def summary(verdicts: Sequence[Verdict], report: Path) -> Text:
         shown.append(
             f"\nBeside it {', '.join(beside)}: none of that counts in the exit code.", "not bold"
         )
-    coarse = wording.coarse_and_missing(ran)
-    shown.append(
-        f"\nEvery number is in {report}, and printed by --verbose. {coarse}".rstrip(), "not bold"
-    )
+    said = [f"\nEvery number is in {report}, and printed by --verbose"]
+    said += filter(None, [wording.coarse_and_missing(ran).rstrip(".")])
+    shown.append(f"{'; '.join(said)}.", "not bold")
     return shown
 
 
