@@ -60,6 +60,7 @@ def fits(p: Parameters, flow: Array, read: Array) -> list[Fit]:
     are on no curve, and for a set of which theory's curve has no kink."""
     from scipy.stats import f  # here, because it takes a second to load
 
+    bifurcation.check_branch(p)
     if len(flow) < 2 * FEWEST:
         raise InputError(f"too few readings: {len(flow)}, where {2 * FEWEST} are needed")
     found = list[Fit]()

@@ -34,7 +34,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"a measured curve needs its meter, {how}; motions come in two")
     (p,) = own.values()
     name, flow, read = curve(args.a)
-    bifurcation.check_branch(p)
+    bifurcation.check_branch(p)  # first: a fault of the set is none of the file's
     try:
         found = measured.fits(p, flow, read)
     except InputError as error:

@@ -259,10 +259,10 @@ class Campaign:
     def _carry_out(self, todo: Sequence[Task]) -> Iterator[tuple[list[Task], list[Ended]]]:
         """Yield each batch of tasks that ends, with what became of them.
 
-        Tasks are shared out evenly among the workers, the longest first: then all end together;
-        no batch of several has more than `MOST_STEPS`. A
-        worker that dies takes all batches under way with it. Their tasks are tried again at the
-        end, one at a time; one that then loses its worker twice has failed."""
+        Tasks are shared out evenly among the workers, the longest first: then all end together; no
+        batch of several has more than `MOST_STEPS`. A worker that dies takes all batches under way
+        with it. Their tasks are tried again at the end, one at a time; one that then loses its
+        worker twice has failed."""
         fresh = deque[list[Task]]()
         share = min(sum(task.steps for task in todo) / self.fleet.count, MOST_STEPS)
         steps, samples = 0.0, 0.0  # of the batch that grows: the sum, and the most of a run

@@ -9,7 +9,7 @@ import pytest
 
 from analytic.bifurcation import diagram
 from analytic.flowmeter import design, measured
-from model import Parameters
+from model import InputError, Parameters
 from tests.commands import refused, told
 
 P = Parameters.named("reference")
@@ -124,3 +124,9 @@ def test_a_kink_at_the_end_of_a_curve_is_not_fitted():
     few = (flows < T.omega_01) | (flows > 1.18 * T.omega_01)
     with pytest.raises(Exception, match="beyond, where 4 are needed on each side"):
         measured.fits(P, flows[few], read[few])
+
+
+def test_a_set_whose_curve_has_no_kink_is_refused():
+    flows = np.linspace(1.0, 40.0, 40)
+    with pytest.raises(InputError, match=r"eta = 0\.6 is out of range"):
+        measured.fits(Parameters.named("high-wall-friction"), flows, 0.9 * flows)
