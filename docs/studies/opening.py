@@ -1,6 +1,6 @@
 """The picture that README opens with: ``python -m docs.studies.opening`` draws docs/opening.png.
 
-Left the ball and what it touches; right how fast it goes round, by theory, by MuJoCo under
+Above the ball and what it touches; below how fast it goes round, by theory, by MuJoCo under
 Coulomb's law and by MuJoCo as it comes: settled runs from rest, made by the command line."""
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle, Rectangle
@@ -32,7 +33,7 @@ DURATION = 30.0
 def main() -> None:
     """Measure and draw."""
     draw({engine: [reading(engine, flow) for flow in FLOWS] for engine in ENGINES}).savefig(
-        PICTURE, dpi=110
+        PICTURE, dpi=200
     )
 
 
@@ -48,15 +49,16 @@ def reading(engine: str, flow: float) -> float:
 
 
 def draw(readings: Mapping[str, Sequence[float]]) -> Figure:
-    """The ball in its vessel beside its characteristic curve."""
-    figure = style.figure(10, 4.2)
-    left, right = figure.subplots(1, 2, width_ratios=[1, 1.6])
-    _sketch(left)
-    _curve(right, Parameters.named("reference"))
-    for (engine, values), mark in zip(readings.items(), "ox", strict=True):
-        right.plot(FLOWS, values, mark, color="black", mfc="white", ms=7, label=ENGINES[engine])
-    right.legend(loc="lower right", frameon=False)
-    return figure
+    """The ball in its vessel over its characteristic curve, with letters to be read on a phone."""
+    with rc_context({"font.size": 12.5}):
+        figure, (above, below) = style.panels(5.4, 4.5, 2, height_ratios=[1, 1.75])
+        _sketch(above)
+        _curve(below, Parameters.named("reference"))
+        for (engine, values), mark in zip(readings.items(), "ox", strict=True):
+            look = {"color": "black", "mfc": "white", "ms": 8}
+            below.plot(FLOWS, values, mark, label=ENGINES[engine], **look)
+        below.legend(loc="lower right", frameon=False, borderaxespad=0.1, labelspacing=0.3)
+        return figure
 
 
 def _curve(axes: Axes, p: Parameters) -> None:
@@ -69,35 +71,36 @@ def _curve(axes: Axes, p: Parameters) -> None:
     axes.plot([0, limit], [0, limit], color=style.COLOURS[Case.RR], lw=2.5, label="exact theory")
     axes.plot(flows, slipping, color=style.COLOURS[Case.SS], lw=2.5)
     for x, case, what in (
-        (1.0, Case.RR, "RR: rolls on floor and wall,\nas fast as the fluid"),
-        (15.0, Case.SS, "SS: slips on both,\nlags behind the fluid"),
+        (0.4, Case.RR, "RR: rolls on\nfloor and wall"),
+        (11.0, Case.SS, "SS: slips on both, lags behind"),
     ):
-        axes.text(x, 15, what, color=style.COLOURS[case])
+        axes.text(x, 17.7, what, color=style.COLOURS[case], va="top")
     axes.set(
         xlim=(0, FASTEST),
-        ylim=(0, 19),
-        xlabel="angular velocity of the fluid (rad/s)",
-        ylabel="angular velocity of the ball's orbit (rad/s)",
+        ylim=(0, 18),
+        yticks=(0, 5, 10, 15),
+        xlabel="how fast the fluid turns (rad/s)",
+        ylabel="how fast the ball\ngoes round (rad/s)",
     )
     axes.grid(alpha=0.25)
 
 
 def _sketch(axes: Axes) -> None:
     """Half of the vessel from the side: axis, floor, wall, and the ball that touches both."""
-    for corner, width, height in (((-0.2, -0.15), 3.35, 0.15), ((3.0, 0), 0.15, 2.6)):
+    for corner, width, height in (((-0.2, -0.15), 4.35, 0.15), ((4.0, 0), 0.15, 2)):
         axes.add_patch(Rectangle(corner, width, height, fc="0.8", ec="none"))
-    axes.add_patch(Rectangle((-0.2, 0), 3.2, 2.35, fc="#E3F0F7", ec="none", zorder=0))
-    axes.add_patch(Circle((2.3, 0.7), 0.7, fc="#F5CC6B", ec="black"))
-    axes.plot([0, 0], [-0.1, 2.6], color="0.4", lw=1, ls="-.")
-    axes.add_patch(Arc((0, 2.1), 1.0, 0.3, theta1=120, theta2=400, color="#0072B2", lw=1.5))
+    axes.add_patch(Rectangle((-0.2, 0), 4.2, 1.8, fc="#E3F0F7", ec="none", zorder=0))
+    axes.add_patch(Circle((3.3, 0.7), 0.7, fc="#F5CC6B", ec="black"))
+    axes.plot([0, 0], [-0.1, 2.0], color="0.4", lw=1, ls="-.")
+    axes.add_patch(Arc((0, 1.4), 0.8, 0.26, theta1=120, theta2=400, color="#0072B2", lw=1.5))
     axes.annotate(
-        "", (0.42, 2.2), xytext=(0.47, 2.02), arrowprops={"arrowstyle": "->", "color": "#0072B2"}
+        "", (0.33, 1.49), xytext=(0.38, 1.31), arrowprops={"arrowstyle": "->", "color": "#0072B2"}
     )
-    axes.text(0.65, 2.05, "the fluid swirls\nand carries the ball round", va="center")
-    axes.plot([2.3, 3.0], [0, 0.7], "o", color="black", ms=6, zorder=4)
-    axes.text(2.25, 0.14, "floor", ha="center", va="bottom", fontsize=9)
-    axes.text(2.92, 0.7, "wall", ha="right", va="center", fontsize=9)
-    axes.set(xlim=(-0.6, 3.2), ylim=(-0.2, 2.7), aspect="equal")
+    axes.text(0.55, 1.1, "the fluid swirls\nand carries\nthe ball round", va="center")
+    axes.plot([3.3, 4.0], [0, 0.7], "o", color="black", ms=6, zorder=4)
+    axes.text(3.25, 0.1, "floor", ha="center", va="bottom")
+    axes.text(3.93, 0.72, "wall", ha="right", va="center")
+    axes.set(xlim=(-0.5, 4.2), ylim=(-0.2, 2.05), aspect="equal")
     axes.axis("off")
 
 
