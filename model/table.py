@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import csv
 import io
+import itertools
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,8 @@ from model.parameters import parse_number
 
 LONGEST = 500_000_000
 """Characters of a table that is read: a device has no end."""
+BLOCK = 10_000
+"""Rows that are written before that is told."""
 _LABEL = re.compile(r"(?P<name>.*?)\s*(?:[(\[](?P<unit>.*?)[)\]]|\bin (?P<after>.*))?")
 
 _SHORT = {"second": "s", "seconds": "s", "sec": "s", "radian": "rad", "radians": "rad"}
@@ -143,11 +146,18 @@ def label(name: str, unit: str) -> str:
     return name if unit == "1" else f"{name} ({unit.replace(' s-1', '/s')})"
 
 
-def write(path: Path, columns: Mapping[str, Sequence[Any]]) -> None:
+def write(
+    path: Path,
+    columns: Mapping[str, Sequence[Any]],
+    tell: Callable[[float], object] = float,
+) -> None:
     """Write columns of numbers and text by their labels as CSV, whole or not at all; raises
-    `StorageError`."""
+    `StorageError`. `tell` is called with the fraction done."""
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(columns)
-    rows.writerows(zip(*columns.values(), strict=True))
+    table, count = zip(*columns.values(), strict=True), len(next(iter(columns.values())))
+    for written in range(0, count, BLOCK):
+        tell(written / count)
+        rows.writerows(itertools.islice(table, BLOCK))
     write_text(path, text.getvalue())

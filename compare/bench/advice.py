@@ -141,15 +141,19 @@ def best_change(
     members: Sequence[int],
     harm: Mapping[str, float],
     calm: Callable[[Any], bool],
+    tell: Callable[[float], object],
 ) -> tuple[Change | None, dict[str, Array]]:
     """The first option, in its mildest value, that makes all contacts good, or helps most.
 
     Also the harm that is left then. `pair` is the worst one, `members` are its contacts, `harm` is
-    its own; `calm` says whether a changed model settles as well."""
+    its own; `calm` says whether a changed model settles as well; `tell` is called with the
+    fraction of options that were tried."""
     c, what, tried = scene.contacts, max(harm, key=lambda fault: harm[fault]), []
     part, names = np.isin(np.arange(len(scene.number)), members), geom_names(scene.model)
     now = _worst(c, part, what)
-    for option, value in _options(c.subset(part)) if harm[what] > 1 else ():
+    options = list(_options(c.subset(part))) if harm[what] > 1 else []
+    for k, (option, value) in enumerate(options):
+        tell(k / len(options))
         other, state = copy.copy(scene.model), copy.copy(scene.data)
         apply(other, option, value)
         mujoco.mj_fwdPosition(other, state)

@@ -115,12 +115,13 @@ def forecast(
     creep: float = CREEP,
     depth: float | None = None,
     control: Control | None = None,
+    tell: Callable[[float], object] = float,
 ) -> Forecast:
     """The forecast for a model as `settle` has left it; `data` is left at its end.
 
     `creep` (m/s) and `depth` (m; by default a hundredth of a body's radius) are what passes for
-    good; `control` is run before each step. Raises `InputError` if nothing touches,
-    `UnsettledError` if the model diverges."""
+    good; `control` is run before each step; `tell` is called with the fraction done. Raises
+    `InputError` if nothing touches, `UnsettledError` if the model diverges."""
     scene = _measured(awake(model), data, settled, with_control(control), creep, depth)
     found = _without_advice(scene, settled)
     worst = found.pairs[0]
@@ -133,7 +134,7 @@ def forecast(
         except UnsettledError:
             return False
 
-    change, left = advice.best_change(scene, worst.name, worst.members, worst.harm, calm)
+    change, left = advice.best_change(scene, worst.name, worst.members, worst.harm, calm, tell)
     creeps = max(pair.harm["creep"] for pair in found.pairs) > 1
     remedy = advice.remedy_code(model) if creeps and 1 < left["creep"].max() < math.inf else ""
     return replace(found, change=change, remedy=remedy)

@@ -91,7 +91,7 @@ def run_forecast(args: argparse.Namespace) -> int:
 
     good = {"creep": args.max_creep or forecast.CREEP, "depth": args.max_depth}
     count = 3 if args.tries else 2
-    settling, trying = (settled.part(args.tell, k, count) for k in (0, 2))
+    settling, advising, trying = (settled.part(args.tell, k, count) for k in range(3))
     heard = mujoco.get_mju_user_warning()
     # it would write a log here; what it warns of is in the table
     mujoco.set_mju_user_warning(lambda _: None)
@@ -99,8 +99,7 @@ def run_forecast(args: argparse.Namespace) -> int:
         model, data = settled.load(args.file, args.keyframe)
         settled.set_controls(model, data, args.ctrl)
         rest = settled.settle(model, data, args.settle, tell=settling)
-        found = forecast.forecast(model, data, rest, **good)
-        args.tell(2 / count)
+        found = forecast.forecast(model, data, rest, tell=advising, **good)
         after = held = None
         if args.tries:
             found, after, held = forecast.follow_advice(

@@ -60,7 +60,7 @@ def inspect(args: argparse.Namespace) -> int:
     if args.plot:
         drawing.save(motions.draw(storage.load(args.file)), args.plot)
     if args.table:
-        table.write(args.table, motions.labelled(storage.load(args.file)))
+        table.write(args.table, motions.labelled(storage.load(args.file)), args.tell)
     about = motions.describe(args.file)
     options.show(about, args.json, motions.table(about))
     return 0

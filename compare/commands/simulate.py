@@ -18,6 +18,8 @@ from model.files import reading_json, write_text
 
 DURATION = 10.0
 """Of a run, s, unless asked otherwise."""
+WRITING = 2.0
+"""Time steps that a run takes while a line of a table is written, about."""
 _TOLD_APART = (
     *("vary", "random", "seed", "direction", "start", "time", "timestep", "rtol"),
     *("restitution", "sample_interval", "means_only"),
@@ -33,13 +35,17 @@ def run(args: argparse.Namespace) -> int:
     with tempfile.TemporaryDirectory() as scratch:
         as_table = options.is_table(args.output)
         path = Path(scratch) / "run.h5" if as_table or not args.output else args.output
+        share = task.steps / (task.steps + WRITING * task.samples * as_table)  # of the run
         # The first signal ends the run with its samples, the second without.
         with signals.noted() as heard:
-            failure = store(task, path, stop=lambda: bool(heard), tell=args.tell)
+            failure = store(
+                task, path, stop=lambda: bool(heard), tell=lambda done: args.tell(share * done)
+            )
         path = failed_path(path) if failure else path
         kept = failed_path(args.output) if args.output and failure else args.output
         if as_table:
-            table.write(kept, motions.labelled(storage.load(path)))
+            columns = motions.labelled(storage.load(path))
+            table.write(kept, columns, lambda done: args.tell(share + (1 - share) * done))
         if failure:  # now, since a signal may come before all else is said
             where = f"its samples so far are kept in {kept}"
             where = where if args.output else "nothing is kept without --output"

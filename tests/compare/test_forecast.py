@@ -408,7 +408,10 @@ def test_settling_and_following_advice_tell_how_far_they_are():
         assert all(0 < done <= 1 for done in told)
         assert data.time < 10.0  # long before the most that it may take
     told.clear()
-    before = forecast.forecast(model, data, rest)
+    before = forecast.forecast(model, data, rest, tell=told.append)
+    assert told == sorted(told)
+    assert len(set(told)) > 5  # an option each
+    told.clear()
     forecast.follow_advice(model, data, before, limit, tell=told.append)
     assert told == sorted(told)
     assert told[-1] > 0

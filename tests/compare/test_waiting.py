@@ -1,14 +1,15 @@
 """A command that takes long says that it is at work, how far it is, and that it compiles."""
 
 import time
+from contextlib import nullcontext
 
 import numba
 import pytest
 
 import analytic
-from compare.commands import waiting
+from compare.commands import simulate, waiting
 from compare.kit import collection, progress
-from model import Parameters
+from model import Parameters, table
 from tests.commands import carried_out
 
 
@@ -66,6 +67,22 @@ def test_compiling_says_so_and_is_no_measure_of_what_is_left(
     left = [float(line.split("about ")[1].split()[0]) for line in said if "to go" in line]
     assert left
     assert left[-1] < takes  # with compiling it would be half as much again
+
+
+def test_a_table_is_told_as_it_is_written(tmp_path, capsys, monkeypatch):
+    told = list[float]()
+    monkeypatch.setattr(waiting, "told", lambda what: nullcontext(told.append))
+    monkeypatch.setattr(table, "BLOCK", 100)
+    run, into = tmp_path / "run.h5", tmp_path / "run.csv"
+    line = "simulate --time 1 --sample-interval 0.002 --engine time-stepping --timestep 0.001"
+    assert carried_out(capsys, *line.split(), "-o", into)[0] == 0
+    assert told == sorted(told)
+    assert sum(done >= 1 / (1 + simulate.WRITING / 2) for done in told) > 5
+    assert carried_out(capsys, *line.split(), "-o", run)[0] == 0
+    told.clear()
+    assert carried_out(capsys, "inspect", run, "--table", tmp_path / "again.csv")[0] == 0
+    assert len(told) == 6
+    assert (tmp_path / "again.csv").read_text() == into.read_text()
 
 
 def test_attractors_and_collections_say_how_far_they_are(tmp_path, capsys):
