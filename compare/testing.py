@@ -336,7 +336,7 @@ def assert_settles(
     k = int(off.argmax())
     assert off[k] <= rtol * scale, (
         f"the ball does not settle in {name}: for the last {SETTLED_PART * lasts:.3g} s omega_c "
-        f"should be within {rtol:g} of {exact:.8g} rad/s, but is off by {off[k] / scale:.2e} at t "
+        f"should be within {rtol:g} of {exact:.8g} rad/s. It is off by {off[k] / scale:.2e} at t "
         f"= {t[k]:g} s (on average {w.mean():.8g} rad/s; it swings by {swing:.1e} rad/s)"
         + "".join(f"; it settles in {other}" for other in elsewhere[:1])
     )

@@ -103,8 +103,8 @@ def pose(point: Array, normal: Array) -> Any:
 
 
 _CREEPS = (
-    "worst with what must not move: it takes a share of the slip out of positions in each of a few "
-    "iterations, so that bodies creep at a rate that more iterations lessen"
+    "worst with what must not move: each of a few iterations takes a share of the slip out of "
+    "positions, so that bodies creep; more iterations lessen that"
 )
 xpbd_defaults = Newton("XPBD", _CREEPS)
 xpbd = Newton("XPBD", _CREEPS, "10 iterations", iterations=10)

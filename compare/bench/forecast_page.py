@@ -172,7 +172,7 @@ data = mujoco.MjData(model)
 LEGEND = (
     "Creep: speed at which what should rest slides on; turning: the same of spinning and rolling "
     "friction. Depth: how far bodies sink into one another. Each is predicted from the load of a "
-    "contact and its parameters; found: measured beside it, from where bodies are after the next "
+    "contact and its parameters. Found: measured beside it, from where bodies are after the next "
     "tenth of a second, or a second where speeds still change.",
     "Cone: share of the friction that a contact can bear which it needs; beyond 100 % it slides. "
     "Short: share of Coulomb's friction that the pyramid lacks in the direction of the load or "

@@ -295,12 +295,10 @@ def design(parser: Parser) -> None:
     corner of the tolerances. The exit code is 1 if it ends below that flow: then no meter within
     the bounds covers the flows."""
     tables = (
-        "TOML, SI units: [fluid] nu_f, rho_f (drag, C_D, gravity); [flow] slowest, fastest, rad/s "
-        "(response, s); "
-        "[bounds] r, R, rho_b, mu, eta (j), each a number or [lowest, highest], or several "
-        "[[material]] with a name "
-        "and bounds of their own; [tolerances] of mu, eta, r, R, relative; what is in round "
-        "brackets may be left out"
+        "TOML, SI units. [fluid] nu_f, rho_f (drag, C_D, gravity). [flow] slowest, fastest, rad/s "
+        "(response, s). [bounds] r, R, rho_b, mu, eta (j), each a number or [lowest, highest]; or "
+        "several [[material]] with a name and bounds of their own. [tolerances] of mu, eta, r, R, "
+        "relative. What is in round brackets may be left out"
     )
     parser.add_argument("file", type=Path, metavar="FILE.toml", help=tables)
     parser.add_argument("-o", "--output", type=PAGE, help="HTML page to write (default: none)")

@@ -199,8 +199,8 @@ MUJOCO = Engine(
     torque=True,
     lands_within=1 / LANDING_PARTS,
     title="MuJoCo under Coulomb's law",
-    about="rigid contacts of a ball on the paper's coordinates, by mjsim.Coulomb, for any model; "
-    "measured at two time steps of at most 4 and 2 ms",
+    about="rigid contacts by mjsim.Coulomb, which any model can have; two time steps, of at most 4 "
+    "and 2 ms",
     mark="o",
 )
 PLAIN = replace(
@@ -210,8 +210,8 @@ PLAIN = replace(
     configure=lambda given, p: plain(given.get("timestep", ContactSettings.timestep)).suited(p),
     stream=_unwarned,
     lands_within=1.0,
-    title="MuJoCo without that law, in the zero-step limit",
-    about="the same ball, on MuJoCo's own contacts",
+    title="MuJoCo without Coulomb's law",
+    about="the same scene with MuJoCo's own contacts, well set, as time steps tend to zero",
     role=Role.IN_THE_LIMIT,
     divisors=(1, 2, 3, 4),
     mark="P",
@@ -242,7 +242,7 @@ _FREE, _AS_IT_COMES = _adapted(_PACKAGES["mujoco_free"], "Xx")
 FREE = replace(
     _FREE,
     name="mujoco-free",
-    title="MuJoCo under that law with a free ball",
+    title="MuJoCo under Coulomb's law with a free ball",
     about="a free body in the place of joints along the paper's coordinates, rigid contacts by "
     "mjsim.Coulomb",
 )
@@ -250,8 +250,7 @@ DEFAULTS = replace(
     _AS_IT_COMES,
     name="mujoco-defaults",
     title="MuJoCo as it comes",
-    about="a free ball in flat facets, MuJoCo's own parameters, 2 ms; confirmed is what is off by "
-    "no more than 5 %",
+    about="default settings at 2 ms, a free ball, a wall of flat pieces; 5 % off counts as right",
     role=Role.AS_IT_COMES,
     divisors=(2,),
     relative_tolerance=0.05,

@@ -169,8 +169,8 @@ def _opening_sentence(ran: Sequence[Verdict]) -> str:
         return "Its closed-form theory by Antali and Stépán is held against simulation."
     return (
         "Antali and Stépán predict its angular velocity ω_c in closed form. In stationary states "
-        f"it was measured {len(orbits)} times, and is off by a share of "
-        f"{max(abs(check.deviation / check.scale) for check in orbits):.1e} at most."
+        f"it was measured {len(orbits)} times, and is off by "
+        f"{wording.percent(max(abs(check.deviation / check.scale) for check in orbits))} at most."
     )
 
 

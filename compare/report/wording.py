@@ -161,7 +161,7 @@ def engine_sentence(said: EngineVerdict) -> str:
 def percent(share: float) -> str:
     """A relative deviation with two digits."""
     shown = f"{100 * share:#.2g}".rstrip(".") if share < 0.995 else f"{100 * share:.0f}"
-    return f"{shown} %" if share >= 1e-6 else size(share)
+    return f"{shown} %" if share >= 1e-6 else f"{size(100 * share)} %"
 
 
 def engines(ran: Sequence[Verdict]) -> list[dict[str, Any]]:
@@ -273,9 +273,7 @@ def coarse_and_missing(ran: Sequence[Verdict]) -> str:
     coarse = sum(not check.conclusive for verdict in ran for check in verdict.checks)
     left_out = sum(each.rows for each in {each for verdict in ran for each in verdict.missing})
     parts = [f"{coarse} of these numbers are too coarse to tell"] * (coarse > 0)
-    parts += [f"{left_out} more could not be measured, each for a reason that is given"] * (
-        left_out > 0
-    )
+    parts += [f"{left_out} more could not be measured"] * (left_out > 0)
     return (
         f"{' and '.join(parts)}: an error of theory there alone would go unnoticed."
         if parts

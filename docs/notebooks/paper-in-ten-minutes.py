@@ -175,7 +175,7 @@ plt.show()
 # %% [markdown]
 # Below $\omega_{01}$ the slip stops within a few milliseconds, as dry friction stops
 # things. Above it the slip grows. At first it grows so fast that it slows the ball down
-# to where rolling is possible, for half a second; the flow speeds it up again, it slips
+# to where rolling is possible, for half a second. The flow speeds it up again. It slips
 # again, and settles in SS.
 #
 # ## The reading that depends on the past

@@ -146,7 +146,7 @@ CLAIMS = (
         "hopping-rebound",
         _PERIODIC,
         "A ball that rebounds hops on, too, lower and lower, up to a coefficient of restitution of "
-        "0.536, where a pair of Floquet multipliers leaves the unit circle; beyond, the hops end. "
+        "0.536, where a pair of Floquet multipliers leaves the unit circle. Beyond, the hops end. "
         "By continuation and time stepping: MuJoCo's contacts have no such coefficient.",
         Criterion("rebounding", "hops", lambda m: float(_rebounding(m).stable), by=_REFINED),
         *criteria(

@@ -241,7 +241,7 @@ CLAIMS = (
     claim(
         "operating-range",
         "Section 5.3",
-        "Up to ω₀₁ (η < j) rolling is the only motion that lasts, up to ω₀₂ for η > j; beyond, "
+        "Up to ω₀₁ (η < j) rolling is the only motion that lasts, up to ω₀₂ for η > j. Beyond, "
         "from rest the ball slips (η < j), and on the wall it stays (η > j).",
         # Slipping on the floor no ball sinks.
         *(

@@ -238,10 +238,10 @@ def draw_fall(of: Diagram) -> tuple[Figure, str]:
                 style.legend(axes, frameon=False)
     return figure, style.caption(
         of.p,
-        "The fall of a ball that the wall carries, once ω₀ has fallen below ω₀₂: it slips at the "
+        "The fall of a ball that the wall carries, once ω₀ has fallen below ω₀₂. It slips at the "
         "wall (NS), sinks, hits the floor, slips at both points (SS), at the floor (SR), and rolls "
-        "(RR). Right: the impact at t = 0, magnified in time and height (dots: samples): it stops "
-        "the sinking at once; a hop would show as a gap, a depth as a negative one. Background: "
+        "(RR). Right: the impact at t = 0, magnified in time and height (dots: samples). It stops "
+        "the sinking at once. A hop would show as a gap, a depth as a negative one. Background: "
         f"the case, by name above; engine: {of.motions[-1].engine if of.motions else EVENT.name}.",
     )
 

@@ -134,7 +134,7 @@ LAW_CLAIMS = (
     claim(
         "table-3",
         "Table 3, (12)-(17)",
-        "A contact that rolls doesn't slip, and one that is closed has no gap; where it slips, "
+        "A contact that rolls doesn't slip, and one that is closed has no gap. Where it slips, "
         "friction is mu or eta times the normal force and opposes the slip. (That contacts press, "
         "and that friction stays within its limit, (12) and (13), is built into any solver of "
         "friction cones: it is not counted.)",
@@ -184,8 +184,8 @@ LAW_CLAIMS = (
         "opening",
         "(12), section 1.1",
         "The wall contact opens where it carries no load, or where friction at the floor pulls the "
-        "ball inwards more "
-        "than its orbit needs; the ball then leaves the wall as the equations say.",
+        "ball inwards more than its orbit needs. The ball then leaves the wall as the equations "
+        "say.",
         *_end_states("pulled off"),
     ),
     claim(
@@ -199,8 +199,8 @@ LAW_CLAIMS = (
         "smooth-wall",
         "Prop. 2, Definitions 1-3",
         "Along a wall without friction a ball goes round with the fluid, rolls on the floor and "
-        "spins about its axis, "
-        "as long as slip at the floor dies out, and friction suffices; faster, it slips.",
+        "spins about its axis, as long as slip at the floor dies out, and friction suffices. "
+        "Faster, it slips.",
         *(
             Criterion("runs", "case", partial(_rolls_or_slips, holds), when=_SMOOTH, by=by)
             for holds, by in ((_is_stable, _HOLDS), (_exists, "analytic.stationary_solutions"))
@@ -210,8 +210,8 @@ LAW_CLAIMS = (
     claim(
         "definition-1-2",
         "Definitions 1 and 2, (82)",
-        "On a floor so rough, μ > 1, that forces would allow a ball to jam between floor and wall "
-        "and roll on beyond ω₀₁, a slight slip dies out at once below ω₀₁, and lasts above.",
+        "On a floor so rough, μ > 1, that a ball could jam between floor and wall and roll on "
+        "beyond ω₀₁, a slight slip dies out at once below ω₀₁, and lasts above.",
         Criterion("runs", "case", _rolls_or_motion, when=_ROUGH, by=_HOLDS),
         Criterion("runs", "end_omega_c", _end_of_motion, when=_ROUGH, by=_RUN),
     ),

@@ -183,7 +183,7 @@ CLAIMS = (
             f"slip-{arrow[0].name}-{arrow[1].name}",
             "(56)-(59)" if arrow == _NR_NS else "(53), Fig. 6",
             f"Out of {arrow[0].name} a slight slip in any direction that {arrow[1].name} allows "
-            "grows at the rate γ while forces admit it; else the ball passes into another case, as "
+            "grows at the rate γ while forces admit it. Else the ball passes into another case, as "
             "the equations of motion say.",
             *_growth(arrow),
         )
@@ -200,8 +200,8 @@ CLAIMS = (
         "eq-13-gamma",
         "3.2, last paragraph",
         "On the wall alone slip in a direction grows in proportion to the friction that rolling "
-        "needs in it, less "
-        "what Coulomb's law allows: γ < 0 in all directions exactly where (13) holds.",
+        "needs in it, less what Coulomb's law allows. So γ < 0 in all directions exactly where "
+        "(13) holds.",
         _gammas(_by_forces, _along(_NR_NS, "", "dragged"), "analytic.contact_forces, (13)"),
     ),
     claim(
@@ -287,8 +287,8 @@ CLAIMS = (
         "definition-3",
         "Definitions 1-3, (67)",
         "Rolling is stable with respect to slipping up to a flow at which it is neutral, and "
-        "unstable beyond (on the "
-        "wall alone the other way round); at rest slip at the wall neither grows nor dies out.",
+        "unstable beyond (on the wall alone the other way round). At rest slip at the wall neither "
+        "grows nor dies out.",
         _gammas(_gamma, _along(_RR_RS, "rest"), "slip_stability.gamma"),
         _neutral_flow("omega_01", Case.RR, "onset of slip"),
         _neutral_flow("omega_02", Case.NR, "onset of sliding on the wall"),

@@ -119,7 +119,7 @@ CLAIMS = (
         "prop-2",
         "Prop. 2, (24), (33)",
         "In a fluid at rest a ball that spins next to the wall keeps its spin, whatever it is (a "
-        "zero eigenvalue); going round dies out at the rate c/(1 + j).",
+        "zero eigenvalue). Going round dies out at the rate c/(1 + j).",
         *_criteria(Case.RS),
     ),
     claim(
@@ -130,8 +130,8 @@ CLAIMS = (
         *_criteria(Case.SR),
         Criterion("rates", "decay_rate", _leans, when=_FIRST_OF_SR, size=_mode_size, by=_LEANING),
         text=Text.CORRECTED,
-        reason="With A_y = 0 the state is on the border to NR: the eigenvalues show on the side "
-        "where the ball leans on the floor; on the other it lifts off, and its height is then "
+        reason="With A_y = 0 the state is on the border to NR. The eigenvalues show on the side "
+        "where the ball leans on the floor. On the other it lifts off, and its height is then "
         "free. (35) needs ω₀ ≥ √(g/(ηR)), not ≤.",
     ),
     claim(

@@ -242,7 +242,7 @@ CLAIMS = (
         "eq-40",
         "(40), (44)",
         "A ball that has settled slipping at both points slips inwards at the floor and up the "
-        "wall, cos α > 0, and backwards, sin α < 0: there is no such motion with cos α < 0.",
+        "wall, cos α > 0, and backwards, sin α < 0. No such motion has cos α < 0.",
         *(
             Criterion("settled", slip, lambda m: 0.0, when=_SLIPS, relation=relation, by="(40)")
             for slip, relation in (("slip_z", Relation.AT_LEAST), ("slip_x", Relation.AT_MOST))
@@ -324,9 +324,9 @@ DIAGRAMS = (
         claim(
             figure,
             f"Fig. {figure[-1]}",
-            f"ω₀₁ … ω₀₄ divide the plane of {axis} and ω₀ into regions: at each point the ball "
-            "settles in every case whose stationary state attracts, or sinks, and in no other (SR "
-            "on an unloaded floor counts as NR).",
+            f"ω₀₁ … ω₀₄ divide the plane of {axis} and ω₀ into regions. At each point the ball "
+            "settles in every case whose stationary state attracts, or sinks, and in no other. (SR "
+            "on an unloaded floor counts as NR.)",
             Criterion(
                 "plane",
                 "cases",
@@ -350,7 +350,7 @@ DIAGRAMS = (
     claim(
         "regions",
         "Figs. 7 and 8, (84)-(90)",
-        "In every region of Figs. 7 and 8 the stationary states of its label exist: balls settle "
+        "In every region of Figs. 7 and 8 the stationary states of its label exist. Balls settle "
         "in the attracting ones and in NS, SS beyond the fold divides two basins, and in SR a ball "
         "leans on the floor.",
         Criterion("plane", "cases", _cases_in_region, by="analytic.bifurcation.diagram.case_map"),

@@ -142,7 +142,7 @@ CLAIMS = (
     claim(
         "eta-critical",
         "(87), Fig. 7",
-        "Slipping at both points ends in a fold for η_cr < η < j; for η < η_cr it passes to the "
+        "Slipping at both points ends in a fold for η_cr < η < j. For η < η_cr it passes to the "
         "state carried by the wall at ω₀₂, without a jump.",
         _thresholds(
             "folds", lambda m: m.parameters.eta > thresholds_of(m).eta_cr, by=f"{_BY}: eta_cr"

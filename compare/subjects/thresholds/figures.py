@@ -163,9 +163,8 @@ _SHOWN = {
     "back at the fold F and ends in SR at NF2",
     "fig-11": "on the floor, for η > j: SR appears at ω₀₂, and RR ends at ω₀₃ where it meets SR "
     "(dots)",
-    "fig-12": "as Fig. 11, but with the floor allowed to pull (A_y < 0), which is formal: the "
-    "branch of SS and its "
-    "bifurcations P3, F and NF2 reappear, and RR and SR exchange stability at NT1",
+    "fig-12": "as Fig. 11, but with the floor allowed to pull (A_y < 0), formally. The branch of "
+    "SS and its bifurcations P3, F and NF2 reappear, and RR and SR exchange stability at NT1",
 }
 
 

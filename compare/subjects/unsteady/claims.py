@@ -99,8 +99,8 @@ CLAIMS = (
         "pulsation-lag",
         "(23)",
         "Rolling at both points the ball follows the flow, pulsating or after a jump, as drag "
-        "alone accelerates it "
-        "and its spin: with Stokes' law as a lag of first order with the time constant (1 + 2j)/c.",
+        "alone accelerates it and its spin. With Stokes' law that is a lag of first order with the "
+        "time constant (1 + 2j)/c.",
         Criterion(
             "pulsation",
             "gain",
@@ -116,17 +116,17 @@ CLAIMS = (
         "pulsation-slip",
         "(23), (66), (67), (73), (82)",
         "In a pulsating flow a rolling ball begins to slip once rolling needs more friction than "
-        "floor and wall can give: not below the amplitude at which slip first lasts, and not above "
-        "the one up to which forces allow rolling. Mostly the two are the same; in between "
-        "Coulomb's law allows both.",
+        "floor and wall can give. It doesn't below the amplitude at which slip first lasts, and "
+        "does above the one up to which forces allow rolling. Mostly the two are the same; in "
+        "between Coulomb's law allows both.",
         _onset_criterion("slip-stability", Relation.AT_LEAST),
         _onset_criterion("infeasible", Relation.AT_MOST),
     ),
     claim(
         "pulsation-limits",
         "(66), (67), (82)",
-        "A slow pulsation makes the ball slip when the flow reaches ω₀₁ or ω₀₃, or falls to rest; "
-        "in a fast one ω_c hardly changes, and the ball slips when the drag of the fluid alone is "
+        "A slow pulsation makes the ball slip when the flow reaches ω₀₁ or ω₀₃, or falls to rest. "
+        "In a fast one ω_c hardly changes, and the ball slips when the drag of the fluid alone is "
         "too strong.",
         Criterion("thresholds", "omega_01", _fastest_flow, when=slips_first, by=_SLOW),
         Criterion("thresholds", "omega_03", _fastest_flow, when=lifts_first, by=_SLOW),

@@ -99,8 +99,8 @@ def draw_pulsation(of: Diagram) -> tuple[Figure, str]:
         p,
         f"A ball in a flow that pulsates about ω₀ = {p.omega_0:.4g} rad/s. Left: gain and phase "
         f"lag of ω_c, where it rolls at both points (RR){both}. Right: the amplitude of the flow "
-        "at which a rolling ball begins to slip, with its limits for slow and fast pulsations; and "
-        "the error of its mean reading when the amplitude is 1.5 times that (dots: computed).",
+        "at which a rolling ball begins to slip, with its limits for slow and fast pulsations. "
+        "Beside it: the error of its mean reading at 1.5 times that amplitude (dots: computed).",
         states=of.states,
     )
 
@@ -132,9 +132,9 @@ def draw_unsteady(of: Diagram) -> tuple[Figure, str]:
         dots = " Dots: mujoco, half the difference of two small jumps, up and down."
     return figure, style.caption(
         of.p,
-        "Left: ω_c after a small jump of the flow, divided by its final change; a ball that rolls "
+        "Left: ω_c after a small jump of the flow, divided by its final change. A ball that rolls "
         f"approaches its new reading slowly, one that slips at both points swings.{dots} Middle: "
-        "ramps of the flow past the fold ω₀₄; the faster the ramp, the later the ball catches up; "
+        "ramps of the flow past the fold ω₀₄. The faster the ramp, the later the ball catches up; "
         "dashed: SS where it is unstable. Right: by how much the flow has passed ω₀₄ when the "
         "ball's lag has halved; dashed: the law of slow ramps, 2.338 (ρ²/(ab))^(1/3).",
         states=measured,
