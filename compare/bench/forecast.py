@@ -122,7 +122,8 @@ def forecast(
     `creep` (m/s) and `depth` (m; by default a hundredth of a body's radius) are what passes for
     good; `control` is run before each step; `tell` is called with the fraction done. Raises
     `InputError` if nothing touches, `UnsettledError` if the model diverges."""
-    scene = _measured(awake(model), data, settled, with_control(control), creep, depth)
+    step, measuring = with_control(control), part(tell, 0, 2 / 3)
+    scene = _measured(awake(model), data, settled, step, measuring, creep, depth)
     found = _without_advice(scene, settled)
     worst = found.pairs[0]
 
@@ -134,7 +135,8 @@ def forecast(
         except UnsettledError:
             return False
 
-    change, left = advice.best_change(scene, worst.name, worst.members, worst.harm, calm, tell)
+    trying = part(tell, 2 / 3, 1)
+    change, left = advice.best_change(scene, worst.name, worst.members, worst.harm, calm, trying)
     creeps = max(pair.harm["creep"] for pair in found.pairs) > 1
     remedy = advice.remedy_code(model) if creeps and 1 < left["creep"].max() < math.inf else ""
     return replace(found, change=change, remedy=remedy)
@@ -157,8 +159,9 @@ def follow_advice(
     after = held = None
     if change := before.change:
         advice.apply(model, change.option, change.value)
-        rest = settle(model, data, limit, control, tell=part(tell, 0, 2))
-        after = _settled_anew(model, data, mujoco.mj_step, rest, control, good)
+        rest = settle(model, data, limit, control, tell=part(tell, 0, 1 / 4))
+        measuring = part(tell, 1 / 4, 1 / 2)
+        after = _settled_anew(model, data, mujoco.mj_step, rest, control, measuring, good)
         measured = "_measured" if change.quantity in ("creep", "depth") else ""
         those = [pair for pair in after.pairs if pair.name == change.pair]
         found = [getattr(pair, f"{change.quantity}{measured}") for pair in those]
@@ -166,8 +169,9 @@ def follow_advice(
         before = replace(before, change=change)
     if before.remedy:
         twin, state, law = advice.remedied(model, data)
-        rest = settle(twin, state, limit, control, law, part(tell, 1, 2))
-        held = _settled_anew(twin, state, law, rest, control, good)
+        rest = settle(twin, state, limit, control, law, part(tell, 1 / 2, 3 / 4))
+        measuring = part(tell, 3 / 4, 1)
+        held = _settled_anew(twin, state, law, rest, control, measuring, good)
         pairs = (replace(p, creep=0 * p.creep, turning=0 * p.turning) for p in held.pairs)
         held = replace(held, pairs=tuple(pairs))
     return before, after, held
@@ -179,12 +183,12 @@ def _settled_anew(
     law: Advance,
     settled: Rest,
     control: Control | None,
+    tell: Callable[[float], object],
     good: Mapping[str, Any],
 ) -> Forecast:
     """A forecast without advice, of a model that is settled anew under another law of stepping."""
-    return _without_advice(
-        _measured(awake(model), data, settled, with_control(control, law), **good), settled
-    )
+    step = with_control(control, law)
+    return _without_advice(_measured(awake(model), data, settled, step, tell, **good), settled)
 
 
 def _measured(
@@ -192,6 +196,7 @@ def _measured(
     data: Any,
     settled: Rest,
     step: Advance,
+    tell: Callable[[float], object],
     creep: float = CREEP,
     depth: float | None = None,
 ) -> advice.AtRest:
@@ -212,7 +217,8 @@ def _measured(
     history: list[dict[tuple[int, int], Array]] = []
 
     def step_and_record(model: Any, data: Any, nstep: int) -> None:
-        for _ in range(nstep):
+        for k in range(nstep):
+            tell(k / nstep)
             step(model, data, 1)
             history.append(loads_by_pair(model, data))
 

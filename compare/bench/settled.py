@@ -160,9 +160,10 @@ def with_control(control: Control | None, step: Advance = mujoco.mj_step) -> Adv
     return controlled
 
 
-def part(tell: Callable[[float], object], number: int, count: int) -> Callable[[float], object]:
-    """A function to be called with the fraction done of one of so many parts of a work."""
-    return lambda done: tell((number + done) / count)
+def part(tell: Callable[[float], object], begin: float, end: float) -> Callable[[float], object]:
+    """A function to be called with the fraction done of a part of a work, between two fractions of
+    the whole."""
+    return lambda done: tell(begin + (end - begin) * done)
 
 
 def awake(model: Any) -> Any:

@@ -90,8 +90,10 @@ def run_forecast(args: argparse.Namespace) -> int:
     from compare.bench import forecast, forecast_page, settled
 
     good = {"creep": args.max_creep or forecast.CREEP, "depth": args.max_depth}
-    count = 3 if args.tries else 2
-    settling, advising, trying = (settled.part(args.tell, k, count) for k in range(3))
+    ends = (0, 1 / 6, 2 / 3, 1) if args.tries else (0, 1 / 4, 1, 1)  # shares of time, about
+    settling, advising, trying = (
+        settled.part(args.tell, *both) for both in itertools.pairwise(ends)
+    )
     heard = mujoco.get_mju_user_warning()
     # it would write a log here; what it warns of is in the table
     mujoco.set_mju_user_warning(lambda _: None)
