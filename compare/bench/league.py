@@ -42,6 +42,11 @@ ENTRIES: dict[str, str] = {
     },
 }
 """Where each engine is; NAME is in its best known settings, NAME-defaults as it comes."""
+_UNDER_THE_LAW = (
+    "mujoco is MuJoCo with free bodies under Coulomb's law, as mujoco-free of other commands; "
+    "MuJoCo's own contacts are those of mujoco-plain and mujoco-defaults."
+)
+"""What is to be quoted with its number."""
 KINDS = ("sticking", "rolling", "sliding", "landing")
 QUICK = (2e-3,)
 LEAST = 1e-8
@@ -116,12 +121,13 @@ def caption(league: Mapping[str, Sequence[Result]]) -> str:
     steps = [f"{1e3 * step:g} ms ({', '.join(names)})" for step, names in sorted(engines.items())]
     if len(steps) == 1:
         steps = [steps[0].partition(" (")[0]]
+    law = f" {_UNDER_THE_LAW}" if "mujoco" in league else ""
     return (
         "Errors at the shortest step in units of each case's scales; up to "
         f"{TOLERANCE:g} an engine passes, ✗ marks more. Order: power of the step with which errors "
         "fall, the median over the cases. Cost: processor time divided by simulated time at the "
         f"shortest step, the median. The shortest step is {' or '.join(steps)}. A dash: the engine "
-        "can't express the case, and was not tried."
+        f"can't express the case, and was not tried.{law}"
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from compare import bench
-from compare.bench import cases, run
+from compare.bench import cases, league, run
 from compare.bench.case import TIME_STEPS, VERSION, read
 from compare.bench.runner import run_all
 from model import InputError, StorageError
@@ -125,6 +125,12 @@ def test_an_adapter_that_gives_nothing_loses_all_cases(tmp_path, monkeypatch, ca
     page = (tmp_path / "out" / "league.html").read_text("utf-8")
     assert "lost" in page
     assert re.search(r"Worst: .*\. Known for: what is told of another case\.", page)
+
+
+def test_a_league_says_what_mujoco_is():
+    """Its 39 of 39 would be quoted as MuJoCo's own."""
+    assert "mujoco is MuJoCo with free bodies under Coulomb's law" in league.caption({"mujoco": []})
+    assert "Coulomb" not in league.caption({"drake": []})
 
 
 def test_a_league_of_one(tmp_path, capsys):
