@@ -122,7 +122,7 @@ def forecast(
     `creep` (m/s) and `depth` (m; by default a hundredth of a body's radius) are what passes for
     good; `control` is run before each step; `tell` is called with the fraction done. Raises
     `InputError` if nothing touches, `UnsettledError` if the model diverges."""
-    step, measuring = with_control(control), part(tell, 0, 2 / 3)
+    step, measuring = with_control(control), part(tell, 0, 1 / 4)
     scene = _measured(awake(model), data, settled, step, measuring, creep, depth)
     found = _without_advice(scene, settled)
     worst = found.pairs[0]
@@ -135,7 +135,7 @@ def forecast(
         except UnsettledError:
             return False
 
-    trying = part(tell, 2 / 3, 1)
+    trying = part(tell, 1 / 4, 1)
     change, left = advice.best_change(scene, worst.name, worst.members, worst.harm, calm, trying)
     creeps = max(pair.harm["creep"] for pair in found.pairs) > 1
     remedy = advice.remedy_code(model) if creeps and 1 < left["creep"].max() < math.inf else ""

@@ -90,7 +90,7 @@ def run_forecast(args: argparse.Namespace) -> int:
     from compare.bench import forecast, forecast_page, settled
 
     good = {"creep": args.max_creep or forecast.CREEP, "depth": args.max_depth}
-    ends = (0, 1 / 6, 2 / 3, 1) if args.tries else (0, 1 / 4, 1, 1)  # shares of time, about
+    ends = (0, 1 / 2, 5 / 6, 1) if args.tries else (0, 1 / 2, 1, 1)  # shares of time, about
     settling, advising, trying = (
         settled.part(args.tell, *both) for both in itertools.pairwise(ends)
     )

@@ -410,7 +410,7 @@ def test_settling_and_following_advice_tell_how_far_they_are():
     told.clear()
     before = forecast.forecast(model, data, rest, tell=told.append)
     assert told == sorted(told)
-    assert 1 < len({done for done in told if done > 2 / 3}) < len(set(told)) - 40  # options, steps
+    assert 1 < len({done for done in told if done > 1 / 4}) < len(set(told)) - 40  # options, steps
     told.clear()
     forecast.follow_advice(model, data, before, limit, tell=told.append)
     assert told == sorted(told)
