@@ -36,6 +36,9 @@ def program() -> NoReturn:
         "agg"  # figures go into files: that of a notebook would be looked for here, too
     )
     os.environ["MUJOCO_GL"] = "disable"  # nothing draws with OpenGL
+    # threads of OpenBLAS wait for one another by spinning, which is most of their time where others
+    # are at work, too
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     with signals.on_first_signal(signals.end):
         try:
             code = main()
