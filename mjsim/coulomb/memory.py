@@ -89,6 +89,8 @@ ROW = np.dtype(
         # times what is held, too, in Newton's method, and in `find_forces`, which adds the shift
         ("residual", _f8),
         ("force", _f8),  # as found, N
+        # minus its derivatives by the residuals of the rows of its unit, kg, in Newton's method
+        ("stiffness", _f8, 6),
         ("limit", _f8),  # the most that a dry joint bears, N or N m
     ],
     align=True,
@@ -149,6 +151,7 @@ MEMORY = np.dtype(
         *((f"{name}_at", _i8) for name in ("dry", "pose", "pair", "point", "xpos", "xmat", "body")),
         *((f"{name}_at", _i8) for name in ("restitution", "dof")),
         *((f"{name}_at", _i8) for name in ("residual", "tried", "step", "matrix", "place")),
+        ("local_at", _i8),
     ],
     align=True,
 )
@@ -192,6 +195,12 @@ def places_of(memory: Any, row: Any) -> Any:
 def jacobian_of(memory: Any, row: Any) -> Any:
     """The Jacobian of a row, of those degrees of freedom."""
     return reals(memory.jacobian_at + 8 * row.first, row.length)
+
+
+@view
+def jacobians_of(memory: Any, unit: Any) -> Any:
+    """The Jacobians of all rows of a unit, of the same degrees of freedom."""
+    return reals(memory.jacobian_at + 8 * unit.first, (unit.dim, unit.length))
 
 
 @view
@@ -240,7 +249,7 @@ class Simulation:
         self._own("restitution", np.array(law.restitution, np.float64))
         record["nv"] = nv = model.nv if law.rigid else 0
         self._own("dof", np.zeros(nv, DOF))
-        for name in ("residual", "tried", "step"):
+        for name in ("residual", "tried", "step", "local"):
             self._own(name, np.zeros(nv))
         self._own("matrix", np.zeros((nv, nv)))
         self._own("xpos", np.zeros((model.ngeom, 3)))

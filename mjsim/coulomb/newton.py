@@ -34,11 +34,23 @@ from .memory import (
     columns_of,
     contacts_of,
     dofs_of,
-    jacobian_of,
+    jacobians_of,
     places_of,
     rows_of,
 )
-from .parameters import DECREASE, EXACT, FALLING, FEWER, SHORTEST, STEPS
+from .parameters import (
+    DECREASE,
+    EXACT,
+    FALLING,
+    FEWER,
+    HARDER,
+    HARDEST,
+    ROUGH,
+    SHORTEST,
+    STEPS,
+    TAMER,
+    TIGHTER,
+)
 from .rows import times
 
 # -- forces and their derivatives ------------------------------------------------------------------
@@ -96,22 +108,22 @@ def row_stiffness(row: Any) -> float:
 
 @kernel
 def find_units(memory: Any) -> None:
-    """Make closed contacts and other rows units."""
+    """Make contacts and other rows units."""
     rows, contacts = rows_of(memory), contacts_of(memory)
     for r in range(len(rows)):
         row = rows[r]
         row.dim, row.contact, row.force = row.kind < CONTACT_ROW, -1, 0.0
     for k in range(memory.contacts):
-        if contacts[k].state != OPEN:
-            unit = rows[contacts[k].address]
-            unit.dim, unit.contact = contacts[k].dim, k
+        unit = rows[contacts[k].address]
+        unit.dim, unit.contact = contacts[k].dim, k
 
 
 @kernel
 def find_islands(model: Any, memory: Any, everywhere: bool) -> None:
     """Find the islands of degrees of freedom that units or joints connect.
 
-    Those are due in which a contact has just closed; or all, `everywhere`.
+    Open contacts connect none, but belong to the island in which they are, if it is one. Those
+    islands are due in which a contact has just closed; or all, `everywhere`.
     """
     rows, contacts, dofs = rows_of(memory), contacts_of(memory), dofs_of(memory)
     parent = integers(model.dof_parentid, model.nv)
@@ -123,7 +135,8 @@ def find_islands(model: Any, memory: Any, everywhere: bool) -> None:
         column = columns_of(memory, rows[u])
         if rows[u].dim > 0 and len(column) > 0:
             rows[u].dof = column[0]
-            for c in column:
+            closed = rows[u].contact < 0 or contacts[rows[u].contact].state != OPEN
+            for c in column[: len(column) * closed]:
                 one, other = root(dofs, column[0]), root(dofs, c)
                 dofs[max(one, other)].label = min(one, other)
     for i in range(model.nv - 1, -1, -1):
@@ -132,11 +145,20 @@ def find_islands(model: Any, memory: Any, everywhere: bool) -> None:
         if first != i:
             dofs[i].next, dofs[first].next = dofs[first].next, i
     for u in range(len(rows) - 1, -1, -1):
-        if rows[u].dof >= 0:
+        if rows[u].dof >= 0 and in_one_island(dofs, columns_of(memory, rows[u])):
             island = dofs[dofs[rows[u].dof].label]
             rows[u].next, island.unit = island.unit, u
             if rows[u].contact >= 0:
                 island.due |= contacts[rows[u].contact].closes
+
+
+@kernel
+def in_one_island(dofs: Any, column: Any) -> bool:
+    """Whether degrees of freedom belong to the same island."""
+    same = True
+    for c in column:
+        same = same and dofs[c].label == dofs[column[0]].label
+    return same
 
 
 @kernel
@@ -185,6 +207,7 @@ def find_residual(model: Any, data: Any, memory: Any, first: int, a: Any) -> flo
     starts, lengths = integers(model.M_rowadr, model.nv), integers(model.M_rownnz, model.nv)
     columns, inertia = integers(model.M_colind, model.nC), reals(data.M, model.nC)
     smooth, residual = reals(data.qfrc_smooth, model.nv), reals(memory.residual_at, model.nv)
+    local = reals(memory.local_at, model.nv)
     i, square = first, 0.0
     while i >= 0:  # M is a lower triangle, row by row; rows end on the diagonal
         residual[i] = -smooth[i]
@@ -195,20 +218,25 @@ def find_residual(model: Any, data: Any, memory: Any, first: int, a: Any) -> flo
         i = dofs[i].next
     u = dofs[first].unit
     while u >= 0:
-        unit = rows[u]
-        for r in range(u, u + unit.dim):
-            rows[r].residual = (
-                times(memory, rows[r], a) - rows[r].reference - rows[r].R * rows[r].held
-            )
+        unit, column = rows[u], columns_of(memory, rows[u])
+        jacobian = jacobians_of(memory, unit)
+        for n in range(len(column)):
+            local[n] = a[column[n]]
+        for r in range(unit.dim):
+            row, acceleration = rows[u + r], 0.0
+            for n in range(len(column)):
+                acceleration += jacobian[r, n] * local[n]
+            row.residual = acceleration - row.reference - row.R * row.held
         if unit.contact < 0:
             unit.force = row_force(unit)
         else:
             contact = contacts[unit.contact]
             contact.state = contact_forces(rows, contact)
-        for r in range(u, u + unit.dim if unit.force != 0 else u):
-            column, jacobian = columns_of(memory, rows[r]), jacobian_of(memory, rows[r])
-            for n in range(len(column)):
-                residual[column[n]] -= jacobian[n] * rows[r].force
+        for n in range(len(column) if unit.force != 0 else 0):
+            force = 0.0
+            for r in range(unit.dim):
+                force += jacobian[r, n] * rows[u + r].force
+            residual[column[n]] -= force
         u = unit.next
     i = first
     while i >= 0:
@@ -235,25 +263,41 @@ def assemble(model: Any, data: Any, memory: Any, first: int, matrix: Any) -> Non
         i = dofs[i].next
     u = dofs[first].unit
     while u >= 0:
-        unit, place = rows[u], places_of(memory, rows[u])
-        for r in range(unit.dim if unit.force != 0 else 0):
-            for s in range(unit.dim):
-                factor = row_stiffness(unit)
-                if unit.contact >= 0:
-                    factor = stiffness(rows, contacts[unit.contact], r, s)
-                if factor != 0:
-                    add_product(memory, factor, rows[u + r], rows[u + s], place, matrix)
-        u = unit.next
+        if rows[u].force != 0:
+            find_stiffness(rows, contacts, u)
+            add_unit(memory, rows, u, matrix)
+        u = rows[u].next
 
 
 @kernel
-def add_product(memory: Any, factor: float, row: Any, other: Any, place: Any, matrix: Any) -> None:
-    """Add the product of the Jacobians of two rows of a unit, times a factor."""
-    jacobian, second = jacobian_of(memory, row), jacobian_of(memory, other)
+def find_stiffness(rows: Any, contacts: Any, u: int) -> None:
+    """Set how the forces of a unit depend on its residuals."""
+    unit = rows[u]
+    if unit.contact < 0:
+        unit.stiffness[0] = row_stiffness(unit)
+        return
+    for r in range(unit.dim):
+        for s in range(unit.dim):
+            rows[u + r].stiffness[s] = stiffness(rows, contacts[unit.contact], r, s)
+
+
+@kernel
+def add_unit(memory: Any, rows: Any, u: int, matrix: Any) -> None:
+    """Add J' K J of a unit, K being its stiffness, row by row."""
+    place, jacobian = places_of(memory, rows[u]), jacobians_of(memory, rows[u])
+    added = reals(memory.local_at, len(place))
     for n in range(len(place)):
-        own, scaled = matrix[place[n]], factor * jacobian[n]
         for k in range(len(place)):
-            own[place[k]] += scaled * second[k]
+            added[k] = 0.0
+        for s in range(len(jacobian)):
+            factor = 0.0
+            for r in range(len(jacobian)):
+                factor += jacobian[r, n] * rows[u + r].stiffness[s]
+            for k in range(len(place)):
+                added[k] += factor * jacobian[s, k]
+        own = matrix[place[n]]
+        for k in range(len(place)):
+            own[np.uint64(place[k])] += added[k]
 
 
 @kernel
@@ -282,12 +326,13 @@ def substitute(matrix: Any, dofs: Any, x: Any) -> None:
 
 
 @kernel
-def solve_island(model: Any, data: Any, memory: Any, first: int, a: Any) -> bool:
-    """Newton's method for the accelerations of an island; whether it came to an end."""
+def solve_island(model: Any, data: Any, memory: Any, first: int, a: Any, exactness: float) -> bool:
+    """Newton's method for the accelerations of an island, to a part of the forces without contacts;
+    whether it came to an end."""
     dofs, size = dofs_of(memory), find_envelope(model, memory, first)
     matrix, step = reals(memory.matrix_at, (size, size)), reals(memory.step_at, size)
     residual, tried = reals(memory.residual_at, model.nv), reals(memory.tried_at, model.nv)
-    enough = EXACT * forces_without_contacts(model, data, memory, first)
+    enough = exactness * forces_without_contacts(model, data, memory, first)
     square = find_residual(model, data, memory, first, a)
     for _ in range(STEPS):
         if square <= enough**2:
@@ -392,13 +437,43 @@ def solve_closed(
     find_islands(model, memory, everywhere)
     dofs = dofs_of(memory)
     for first in range(model.nv):
-        if dofs[first].label == first and dofs[first].due:
-            gives_way, last, rounds = math.inf, math.inf, 0
-            while rounds < memory.law.most and (gives_way > enough or gives_way < FALLING * last):
-                if not solve_island(model, data, memory, first, a):
-                    return False
-                last, gives_way = gives_way, hold_forces(memory, first)
-                rounds += 1
-            if gives_way > enough:
-                return False
+        due = dofs[first].label == first and dofs[first].due
+        if due and not solve_rigid_island(model, data, memory, first, a, enough):
+            return False
     return True
+
+
+@kernel
+def solve_rigid_island(
+    model: Any, data: Any, memory: Any, first: int, a: Any, enough: float
+) -> bool:
+    """Solve an island until R makes its contacts give way no more, m s-2: proximal point method.
+
+    R falls from solution to solution, so that they come near sooner (Rockafellar 1976); it grows
+    where Newton's method comes to no end. Then it is again what it was.
+    """
+    gives_way, last, scale, solved, hardest = math.inf, math.inf, TAMER, True, False
+    multiply_R(memory, first, scale)
+    for _ in range(memory.law.most):
+        if hardest and solved and gives_way <= enough and gives_way >= FALLING * last:
+            break
+        hardest |= scale <= HARDEST
+        solved = solve_island(model, data, memory, first, a, EXACT if hardest else ROUGH)
+        factor = TAMER
+        if solved:
+            last, gives_way = gives_way, hold_forces(memory, first)
+            factor = max(HARDER if gives_way > TIGHTER * enough else 0.0, HARDEST / scale)
+        scale *= factor
+        multiply_R(memory, first, factor)
+    multiply_R(memory, first, 1 / scale)
+    return solved and gives_way <= enough
+
+
+@kernel
+def multiply_R(memory: Any, first: int, factor: float) -> None:
+    """Multiply R of the contacts of an island."""
+    rows, u = rows_of(memory), dofs_of(memory)[first].unit
+    while u >= 0:
+        for r in range(u, u + rows[u].dim if rows[u].contact >= 0 else u):
+            rows[r].R *= factor
+        u = rows[u].next

@@ -79,16 +79,21 @@ ITERATIONS = 20
 error, as a factor."""
 CORNER = 1.05 * math.pi
 """Angle without other points of its patch that a corner of the patch sees at least."""
-STEPS = 40
-"""Factorisations that Newton's method may take for an island."""
-EXACT = 1e-9
-"""Part of the forces without contacts to which it solves."""
+STEPS = 20
+"""Factorisations that Newton's method may take for an island with one R."""
+EXACT, ROUGH = 1e-9, 3e-2
+"""Part of the forces without contacts to which it solves, and while contacts give way too much."""
 FEWER, DECREASE, SHORTEST = 0.5, 1e-4, 1e-3
 """By what a Newton step is shortened; by how much, relative to its length, the residual must fall;
 the shortest."""
-SOFTER = 30.0
+SOFTER = 32.0
 """How much larger R is in a step that Newton's method solves, which holds forces until contacts
 give way no more."""
+HARDER, HARDEST, TAMER = 0.5, 2.0**-5, 4.0
+"""What R is multiplied by after a solution, until it is the part of what it was first; and where
+there is none. Powers of two, which are undone exactly."""
+TIGHTER = 0.02
+"""Part of `share` from which R is the least."""
 FALLING = 0.1
 """Part to which what they give way must fall by a solution for another one to be tried, when it is
 little enough."""
