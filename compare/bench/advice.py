@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 
 from compare.bench.contact_law import Array, Contacts, geom_names, parameters
+from compare.bench.settled import Rest
 from mjsim import Coulomb
 
 UNNAMED = {"solref": (0.02, 1.0), "solimp": (0.9, 0.95)}
@@ -106,10 +107,11 @@ def apply(model: Any, option: str, value: Sequence[float]) -> None:
 
 @dataclass(frozen=True)
 class AtRest:
-    """A settled model: its contacts, what was measured of them, and what passes for good."""
+    """A settled model, its contacts, and what was measured of them."""
 
     model: Any
     data: Any
+    settled: Rest
     contacts: Contacts
     number: Array
     """By which `data` has them."""
@@ -118,7 +120,9 @@ class AtRest:
     moves: Array
     found: Mapping[str, Array]
     creep: float
+    """What passes for good, m/s."""
     depth: Array
+    """What passes for good, of each, m."""
 
     @np.errstate(over="ignore")
     def harm(self, c: Contacts) -> dict[str, Array]:

@@ -35,12 +35,22 @@ from compare.bench.settled import (
 from model import InputError
 from model.errors import few
 
-CREEP, DEPTH = 1e-5, 0.01
-"""What passes for good unless said: creep in m/s; depth, in radii of the smaller body."""
+DEPTH = 0.01
+"""What passes for good unless said, in radii of the smaller body."""
 SECOND, CHECKED = 1.0, 3.0
 """How long what moves is measured, s; and within how many a changed model must settle."""
 SHOWN = 12
 """The worst pairs, which are shown."""
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """What passes for good."""
+
+    creep: float = 1e-5
+    """m/s."""
+    depth: float | None = None
+    """m; None: `DEPTH` times a body's radius."""
 
 
 @dataclass(frozen=True)
@@ -112,19 +122,17 @@ def forecast(
     model: Any,
     data: Any,
     settled: Rest,
-    creep: float = CREEP,
-    depth: float | None = None,
+    tolerances: Tolerances = Tolerances(),
     control: Control | None = None,
     tell: Callable[[float], object] = float,
 ) -> Forecast:
     """The forecast for a model as `settle` has left it; `data` is left at its end.
 
-    `creep` (m/s) and `depth` (m; by default a hundredth of a body's radius) are what passes for
-    good; `control` is run before each step; `tell` is called with the fraction done. Raises
-    `InputError` if nothing touches, `UnsettledError` if the model diverges."""
+    `control` is run before each step; `tell` is called with the fraction done. Raises `InputError`
+    if nothing touches, `UnsettledError` if the model diverges."""
     step, measuring = with_control(control), part(tell, 0, 1 / 4)
-    scene = _measured(awake(model), data, settled, step, measuring, creep, depth)
-    found = _without_advice(scene, settled)
+    scene = _measured(model, data, settled, step, tolerances, measuring)
+    found = _without_advice(scene)
     worst = found.pairs[0]
 
     def calm(other: Any) -> bool:
@@ -147,9 +155,8 @@ def follow_advice(
     data: Any,
     before: Forecast,
     limit: float,
-    control: Control | None = None,
+    tolerances: Tolerances = Tolerances(),
     tell: Callable[[float], object] = float,
-    **good: Any,
 ) -> tuple[Forecast, Forecast | None, Forecast | None]:
     """Follow the advice and settle anew, for at most `limit` s: forecasts before, after, beyond.
 
@@ -159,9 +166,10 @@ def follow_advice(
     after = held = None
     if change := before.change:
         advice.apply(model, change.option, change.value)
-        rest = settle(model, data, limit, control, tell=part(tell, 0, 1 / 4))
+        rest = settle(model, data, limit, tell=part(tell, 0, 1 / 4))
         measuring = part(tell, 1 / 4, 1 / 2)
-        after = _settled_anew(model, data, mujoco.mj_step, rest, control, measuring, good)
+        scene = _measured(model, data, rest, mujoco.mj_step, tolerances, measuring)
+        after = _without_advice(scene)
         measured = "_measured" if change.quantity in ("creep", "depth") else ""
         those = [pair for pair in after.pairs if pair.name == change.pair]
         found = [getattr(pair, f"{change.quantity}{measured}") for pair in those]
@@ -169,26 +177,12 @@ def follow_advice(
         before = replace(before, change=change)
     if before.remedy:
         twin, state, law = advice.remedied(model, data)
-        rest = settle(twin, state, limit, control, law, part(tell, 1 / 2, 3 / 4))
-        measuring = part(tell, 3 / 4, 1)
-        held = _settled_anew(twin, state, law, rest, control, measuring, good)
+        rest = settle(twin, state, limit, law=law, tell=part(tell, 1 / 2, 3 / 4))
+        scene = _measured(twin, state, rest, law, tolerances, part(tell, 3 / 4, 1))
+        held = _without_advice(scene)
         pairs = (replace(p, creep=0 * p.creep, turning=0 * p.turning) for p in held.pairs)
         held = replace(held, pairs=tuple(pairs))
     return before, after, held
-
-
-def _settled_anew(
-    model: Any,
-    data: Any,
-    law: Advance,
-    settled: Rest,
-    control: Control | None,
-    tell: Callable[[float], object],
-    good: Mapping[str, Any],
-) -> Forecast:
-    """A forecast without advice, of a model that is settled anew under another law of stepping."""
-    step = with_control(control, law)
-    return _without_advice(_measured(awake(model), data, settled, step, tell, **good), settled)
 
 
 def _measured(
@@ -196,12 +190,11 @@ def _measured(
     data: Any,
     settled: Rest,
     step: Advance,
+    tolerances: Tolerances,
     tell: Callable[[float], object],
-    creep: float = CREEP,
-    depth: float | None = None,
 ) -> advice.AtRest:
     """The contacts of a settled model and what was measured; `data` is at its end."""
-    moving = settled.moving
+    model, moving = awake(model), settled.moving
     if moving:
         step_to_most_contacts(model, data, step)
     those, number = contacts(model, data)
@@ -236,12 +229,13 @@ def _measured(
             those.force[part, 0] *= load
             those.force[part, 1:] *= friction / sideways if sideways > 1e-9 * then[0] else load
             found["depth_measured"][part] = mean[1] / max(mean[2], 1e-300)
-    good = np.full(len(number), depth) if depth else DEPTH * radius
+    deep = np.full(len(number), tolerances.depth) if tolerances.depth else DEPTH * radius
     own = those.subset(np.ones(len(number), bool))
-    return advice.AtRest(model, start, own, number, radius, moves, found, creep, good)
+    good = tolerances.creep, deep
+    return advice.AtRest(model, start, settled, own, number, radius, moves, found, *good)
 
 
-def _without_advice(scene: advice.AtRest, settled: Rest) -> Forecast:
+def _without_advice(scene: advice.AtRest) -> Forecast:
     """The forecast for a settled model without advice."""
     those, moves, names = scene.contacts, scene.moves, geom_names(scene.model)
     law, harms, pairs = those.law(), scene.harm(those), []
@@ -274,8 +268,8 @@ def _without_advice(scene: advice.AtRest, settled: Rest) -> Forecast:
     pairs.sort(key=lambda pair: -max(pair.harm.values()))
     alone = min(pair.largest_step for pair in pairs)
     largest = min(alone, those.largest_step(min(alone, LARGEST)))
-    step = scene.model.opt.timestep
-    return Forecast(tuple(pairs), step, largest, settled, _count_flexible(scene.data), None, "")
+    step, flexible = scene.model.opt.timestep, _count_flexible(scene.data)
+    return Forecast(tuple(pairs), step, largest, scene.settled, flexible, None, "")
 
 
 def _count_flexible(data: Any) -> int:

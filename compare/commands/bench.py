@@ -89,7 +89,8 @@ def run_forecast(args: argparse.Namespace) -> int:
 
     from compare.bench import forecast, forecast_page, settled
 
-    good = {"creep": args.max_creep or forecast.CREEP, "depth": args.max_depth}
+    creep = args.max_creep or forecast.Tolerances.creep
+    tolerances = forecast.Tolerances(creep, args.max_depth)
     ends = (0, 1 / 2, 5 / 6, 1) if args.tries else (0, 1 / 2, 1, 1)  # shares of time, about
     settling, advising, trying = (
         settled.part(args.tell, *both) for both in itertools.pairwise(ends)
@@ -101,11 +102,11 @@ def run_forecast(args: argparse.Namespace) -> int:
         model, data = settled.load(args.file, args.keyframe)
         settled.set_controls(model, data, args.ctrl)
         rest = settled.settle(model, data, args.settle, tell=settling)
-        found = forecast.forecast(model, data, rest, tell=advising, **good)
+        found = forecast.forecast(model, data, rest, tolerances, tell=advising)
         after = held = None
         if args.tries:
             found, after, held = forecast.follow_advice(
-                model, data, found, args.settle, tell=trying, **good
+                model, data, found, args.settle, tolerances, trying
             )
     except settled.UnsettledError as error:
         print(f"dualball: {args.file}: {error}", file=sys.stderr)

@@ -339,7 +339,7 @@ def test_advice_does_what_it_says(scene, tmp_path, monkeypatch):
         np.testing.assert_allclose(getattr(pasted, name), getattr(model, name))
     for name in [change.option] if hasattr(model.opt, change.option) else ():
         assert getattr(pasted.opt, name) == getattr(model.opt, name)
-    creeps = max(pair.creep for pair in after.pairs) > forecast.CREEP
+    creeps = max(pair.creep for pair in after.pairs) > forecast.Tolerances.creep
     assert bool(found.remedy) == bool(held) == creeps
     if held:
         (tmp_path / "scene.xml").write_text((SCENES | DEEP)[scene])
@@ -347,7 +347,7 @@ def test_advice_does_what_it_says(scene, tmp_path, monkeypatch):
         assert names["data"].time == names["model"].opt.timestep
     for pair in held.pairs if held else ():
         assert pair.creep == 0
-        assert pair.creep_measured < 1e-3 * forecast.CREEP
+        assert pair.creep_measured < 1e-3 * forecast.Tolerances.creep
 
 
 CLOTH = '<flexcomp name="c" type="grid" count="4 4 1" spacing=".05 .05 .05" '
