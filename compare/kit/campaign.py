@@ -19,7 +19,7 @@ import threading
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures import Future
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
@@ -27,7 +27,7 @@ from typing import Any, Self
 from compare.kit.lock import Lock
 from compare.kit.progress import Show, show_nothing
 from compare.kit.tasks import Task, carry_out, deadline, failed_path, store
-from compare.kit.workers import Workers, processes
+from compare.kit.workers import Workers, first_done, processes
 from model import InputError, SimulationError, StorageError, Trajectory, storage
 from model.files import make_directory, remove_leftovers, write_text
 from model.parameters import POSITIVE, Range, check_number
@@ -290,10 +290,7 @@ class Campaign:
             while fresh and len(pending) < 2 * self.fleet.count:
                 batch = fresh.popleft()
                 pending[self.fleet.submit(run_batch, batch, self._storing, self.limit)] = batch
-            # `wait` waits for cancelled ones that nobody told of it
-            if not any(future.done() for future in pending):
-                wait(pending, return_when=FIRST_COMPLETED)
-            for future in [each for each in pending if each.done()]:
+            for future in first_done(pending):
                 batch = pending.pop(future)
                 if future.cancelled():
                     raise StorageError("the workers' scheduler is gone; finished runs are kept")

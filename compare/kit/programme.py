@@ -10,7 +10,7 @@ import hashlib
 import json
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures import Future
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from graphlib import TopologicalSorter
@@ -23,7 +23,7 @@ from compare.kit.plan import LAWLESS, PLAN, planned
 from compare.kit.record import Measured, Measurement, Missing, Origin, Planned, Records, Sets
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.tasks import sources
-from compare.kit.workers import threads
+from compare.kit.workers import first_done, threads
 from model import Parameters, StorageError
 from model.files import make_directory
 
@@ -170,7 +170,7 @@ def run(jobs: Sequence[Job]) -> Iterator[tuple[Job, Records | Exception]]:
                         )
                         future = pool.submit(carry_out, job, before)
                     running[future] = job.name
-                for future in wait(running, return_when=FIRST_COMPLETED).done:
+                for future in first_done(running):
                     name, error = running.pop(future), future.exception()
                     order.done(name)
                     if error is None:

@@ -9,13 +9,15 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from concurrent.futures import (
+    FIRST_COMPLETED,
     CancelledError,
     Executor,
     Future,
     ProcessPoolExecutor,
     ThreadPoolExecutor,
+    wait,
 )
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -38,6 +40,8 @@ JUDGING = 30.0
 longest takes at the quick level. What files say may be nonsense that takes years."""
 PATIENCE = 10.0
 """How long a scheduler has to answer, s."""
+ASLEEP = 1.0
+"""How long a thread that waits sleeps at a stretch, s."""
 
 
 @dataclass(eq=False)
@@ -83,7 +87,7 @@ class Workers:
             return
         for item, future in [(item, self.submit(one, item)) for item in items]:
             try:
-                yield future.result()
+                yield first_done([future])[0].result()
             except self.lost:
                 yield one(item)
 
@@ -239,6 +243,16 @@ def threads(count: int) -> Iterator[ThreadPoolExecutor]:
         pool.shutdown(wait=False, cancel_futures=True)
         raise
     pool.shutdown()
+
+
+def first_done(futures: Collection[Future[T]]) -> list[Future[T]]:
+    """Wait for some futures; those that are done or cancelled, as soon as there is one.
+
+    The main thread looks up now and then, as a signal that another thread gets, or that comes as
+    it falls asleep, doesn't wake it. And nobody tells `wait` of what is cancelled."""
+    while not (done := [each for each in futures if each.done()]):
+        wait(futures, ASLEEP, FIRST_COMPLETED)
+    return done
 
 
 class LateError(BaseException):

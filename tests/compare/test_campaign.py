@@ -24,7 +24,7 @@ from compare.kit import collection
 from compare.kit.campaign import FAILURES, Campaign, Failure, Storing, run_batch
 from compare.kit.lock import Lock
 from compare.kit.tasks import Task
-from compare.kit.workers import Workers, _without_signals, dask, processes
+from compare.kit.workers import Workers, _without_signals, dask, first_done, processes
 from mjsim import RigidContacts
 from model import Flow, InputError, Parameters, SimulationError, StorageError, storage
 from model.trajectory import Trajectory, columns
@@ -266,6 +266,25 @@ def test_what_a_killed_process_was_to_do_is_done_here(count):
         assert list(work.map(abs, [-1, -2])) == [1, 2]
 
 
+def test_a_signal_that_another_thread_gets_wakes_who_waits_for_work():
+    """And so does the end of work that nobody carries out any more."""
+    futures = [Future[None](), Future[None]()]
+
+    def work():
+        time.sleep(0.2)
+        signal.pthread_kill(threading.get_ident(), signal.SIGTERM)
+
+    before = signal.signal(signal.SIGTERM, lambda number, frame: futures[1].cancel())
+    late = threading.Timer(20, futures[0].set_result, [None])
+    try:
+        threading.Thread(target=work).start()
+        late.start()
+        assert first_done(futures) == futures[1:]
+    finally:
+        late.cancel()
+        signal.signal(signal.SIGTERM, before)
+
+
 def test_a_signal_that_another_thread_gets_waits_until_a_worker_has_started():
     heard, wait = [], threading.Event()
     (thread := threading.Thread(target=wait.wait)).start()
@@ -321,7 +340,7 @@ def test_a_scheduler_that_dies_is_said_and_what_is_whole_stays(
 ):
     """Also where all that it did is there before it is missed."""
     if slow:
-        monkeypatch.setattr("compare.kit.campaign.wait", lambda futures, **how: wait(futures))
+        monkeypatch.setattr("compare.kit.workers.wait", lambda futures, *how: wait(futures))
     fleet = Workers(1, lambda: Orphaned(2), lambda executor, at_once: executor.shutdown(), ())
     gone = "the workers' scheduler is gone; finished runs are kept"
     with pytest.raises(StorageError, match=gone), Campaign(tmp_path, fleet, batch=1) as campaign:
