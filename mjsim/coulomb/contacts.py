@@ -13,6 +13,7 @@ from typing import Any
 from .compiling import kernel
 from .engine import (
     MJ_CONTACT,
+    engine_contacts,
     integers,
     mj_addContact,
     mj_fwdVelocity,
@@ -23,7 +24,6 @@ from .engine import (
     reals,
     words,
 )
-from .engine import contacts_of as engine_contacts
 from .memory import (
     CONTACT_ROW,
     DRY,

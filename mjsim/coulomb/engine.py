@@ -125,7 +125,7 @@ def array_at(item: Any) -> Any:
     return array
 
 
-models, datas, contacts_of = array_at(MJ_MODEL), array_at(MJ_DATA), array_at(MJ_CONTACT)
+models, datas, engine_contacts = array_at(MJ_MODEL), array_at(MJ_DATA), array_at(MJ_CONTACT)
 reals, integers = array_at(types.float64), array_at(types.int32)
 words = array_at(types.int64)
 

@@ -13,8 +13,7 @@ from typing import Any
 
 from .compiling import kernel
 from .contacts import axis_of, kind_of
-from .engine import contacts_of as engine_contacts
-from .engine import reals
+from .engine import engine_contacts, reals
 from .memory import NEW, OPEN, SLIDES, STICKS, contacts_of, dry_of, rows_of
 from .parameters import FEEDBACK, SLOWEST, STEADIER
 from .rows import multiply

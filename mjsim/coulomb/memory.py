@@ -2,6 +2,11 @@
 
 Compiled code reads and writes it through the address of its `MEMORY`, which has the addresses of
 the arrays; those belong to a `Simulation`, which makes larger ones when it is asked to.
+
+The way of a contact's force: from step to step it is `load` and `friction`, in the axes of both
+geoms, which turn along. `carried` is the friction in the axes of this step's contact. Rows have it
+as `remembered`, and the part of it that gives way no more as `held`. `force` is what the step comes
+to, and is stored as `load` and `friction` when the next step looks for its contacts.
 """
 
 from __future__ import annotations
@@ -40,10 +45,12 @@ CONTACT = np.dtype(
         ("friction", _f8, (2, 3, 2)),
         ("speed", _f8, 3),  # of slip, by the last Jacobian and present velocities, m s-1
         ("lift", _f8),  # distance that a servo holds, m
-        # De Saxcé's shift, the coefficient of friction times the slip, m s-2: as it was predicted;
-        # as it was found; of what slides as extrapolated, -1 if it wasn't; what is added to that,
-        # the mean of what was added before and of what that missed; by how much all was wrong
-        *(("predicted", _f8), ("found", _f8), ("extrapolated", _f8), ("bias", _f8), ("error", _f8)),
+        # De Saxcé's shift, the coefficient of friction times the slip, m s-2
+        ("predicted", _f8),
+        ("found", _f8),
+        ("extrapolated", _f8),  # as if accelerations stayed those of the last step; -1: not known
+        ("bias", _f8),  # what to add to that: half of its last miss and half of what was added
+        ("error", _f8),  # by how much the prediction was wrong
         # -- of one step alone --
         ("index", _i4),  # its number in mjData
         ("address", _i4),  # its first constraint row
@@ -85,8 +92,8 @@ ROW = np.dtype(
         ("reference", _f8),  # acceleration it asks for without memory and shift, m s-2
         ("remembered", _f8),  # force of the step before, or of the last solution of this one, N
         ("held", _f8),  # the part of it that it keeps without giving way, N
-        # m s-2: J qacc after `multiply`; less the reference after `subtract_references`; less R
-        # times what is held, too, in Newton's method, and in `find_forces`, which adds the shift
+        # m s-2, first J qacc (`multiply`), then less the reference (`subtract_references`); in
+        # Newton's method and `find_forces` also less R times what is held
         ("residual", _f8),
         ("force", _f8),  # as found, N
         # minus its derivatives by the residuals of the rows of its unit, kg, in Newton's method

@@ -55,39 +55,69 @@ from .rows import add_turning, multiply, set_up, store_speeds, write_references
 
 @kernel
 def law_of_a_step(m: int, d: int, at: int) -> None:
-    """Apply Coulomb's law: velocities are known, and MuJoCo hasn't found the forces yet."""
+    """Apply Coulomb's law: velocities are known, and MuJoCo hasn't found the forces yet.
+
+    Rows ask for a step without slip and approach at its end (Moreau), and hold what was borne
+    before; normal ones are shifted by the slip times mu (De Saxcé), for which MuJoCo's cone is
+    Coulomb's. Slip is predicted from the last step's; where that is in doubt, it is solved for.
+    """
     model, data, memory = models(m, 1)[0], datas(d, 1)[0], memories(at, 1)[0]
     memory.model, memory.data = m, d
+    gravity = size_of_gravity(model)
+    enough, rigid = memory.law.share * gravity, memory.law.rigid
     if memory.law.kinetic < 1:
         strengthen(data, memory)
     known, over, since = begin(model, data, memory)
-    if data.ncon == 0 and not memory.law.rigid:  # nothing touches: all is MuJoCo's own
+    if data.ncon == 0 and not rigid:  # nothing touches: all is MuJoCo's own
         forget_contacts(memory)
         return
-    if memory.law.rigid:
+    if rigid:
         add_dampers(model, data, memory)
-    still = known and nothing_moved(model, data, memory)
-    if still:
-        read_gaps(data, memory)
-        keep_forces(memory, over)
-    else:
-        hand_on(model, data, memory, known, over)
-        find(model, data, memory)
-        anew = False
-        if match(model, data, memory) > memory.least:
-            anew = put_points_back(model, data, memory)
-        if anew or leave_added_points_out(model, data, memory):
-            find(model, data, memory)
-            match(model, data, memory)
-        copy_jacobians(model, data, memory)
-        remember_forces(memory)
+    moved = not known or not nothing_moved(model, data, memory)
+    find_contacts(model, data, memory, known, over, moved)
     if memory.free_bodies:
         add_gyroscopic_moments(model, data, memory, known, over)
     memory.pending = memory.contacts + memory.dry > 0
     if not memory.pending:
         return
-    gravity = size_of_gravity(model)
-    enough = memory.law.share * gravity
+    ask(model, data, memory, gravity, since if known and moved else 0.0)
+    if predict_slip(model, data, memory, enough, gravity) or not known:
+        solve(model, data, memory, enough, gravity, known)
+    elif rigid:
+        oppose_slip_at_mid_step(model, data, memory, gravity)
+    if rigid:
+        share_softness(model, data, memory)
+        if data.nefc != memory.rows:  # MuJoCo's memory was too small
+            forget_contacts(memory)
+            return
+    write_references(data, memory)
+
+
+@kernel
+def find_contacts(model: Any, data: Any, memory: Any, known: bool, over: bool, moved: bool) -> None:
+    """Find the contacts and rows of the step, and let them remember what those before bore."""
+    if not moved:
+        read_gaps(data, memory)
+        keep_forces(memory, over)
+        return
+    hand_on(model, data, memory, known, over)
+    find(model, data, memory)
+    anew = False
+    if match(model, data, memory) > memory.least:
+        anew = put_points_back(model, data, memory)
+    if anew or leave_added_points_out(model, data, memory):
+        find(model, data, memory)
+        match(model, data, memory)
+    copy_jacobians(model, data, memory)
+    remember_forces(memory)
+
+
+@kernel
+def ask(model: Any, data: Any, memory: Any, gravity: float, since: float) -> None:
+    """Find what rows ask for: MuJoCo's references, mended in mjData first, and then read.
+
+    `since`: for how long contacts have turned along with their bodies, s; 0: they haven't.
+    """
     if memory.law.kinetic < 1:
         weaken(model, data, memory, gravity)
     multiply(memory, reals(data.qacc, model.nv))
@@ -95,19 +125,9 @@ def law_of_a_step(m: int, d: int, at: int) -> None:
         stiffen(model, data, memory, gravity)
     elif memory.law.servo:
         take_depth_away(model, data, memory)
-    if since > 0 and known and not still:
+    if since > 0:
         add_turning(model, data, memory, since)
     set_up(data, memory)
-    if predict_slip(model, data, memory, enough, gravity) or not known:
-        solve(model, data, memory, enough, gravity, known)
-    elif memory.law.rigid:
-        oppose_slip_at_mid_step(model, data, memory, gravity)
-    if memory.law.rigid:
-        share_softness(model, data, memory)
-        if data.nefc != memory.rows:
-            forget_contacts(memory)
-            return
-    write_references(data, memory)
 
 
 @kernel
