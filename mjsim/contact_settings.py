@@ -33,7 +33,7 @@ FORESEEN, YIELDS = 2e-3, 1e-5
 at most twice, and once all is steady a hundredth of `Law.softness` of mjsim.coulomb. (Both were
 chosen after slips of a rolling ball had been seen.)"""
 LANDING_PARTS = 16
-"""Into how many parts a step is divided in which a ball with rigid contacts lands: a blow falls
+"""Into how many parts a step is divided in which a ball with rigid contacts lands: an impact falls
 into one of them."""
 _LEFT, _STURDY = 0.95, ((3.0, 0.75), (4.0, 1.0), (8.0, 1.0), (12.0, 1.5))
 """`contact_decay` beyond which contacts are made slower; and `solref` with its time in steps, the

@@ -107,7 +107,7 @@ def lands(body: Joints) -> bool:
 
 def stop_landing(body: Joints) -> None:
     """Stop a ball where it touches floor or wall, if it would overlap what it didn't touch in the
-    last step, so that one step has all of the blow."""
+    last step, so that one step has all of the impact."""
     for i, normal in ((1, _NORMAL_B), (2, _NORMAL_A)):
         if body.ahead > 0 and body.qpos[i] < 0 and body.sensors[normal] == 0:
             body.qpos[i] = 0.0
@@ -129,7 +129,7 @@ def take_step(body: Joints, step: float, omega_0: float) -> None:
     falls_on_B = v.v_h < 0 and body.sensors[_NORMAL_B] == 0
     mj_step(body.model, body.data)
     if (falls_on_A and body.sensors[_NORMAL_A] > 0) or (falls_on_B and body.sensors[_NORMAL_B] > 0):
-        v = velocity_of(body)  # of a blow nothing is extrapolated
+        v = velocity_of(body)  # of an impact nothing is extrapolated
     for i in range(6):
         last[i] = v[i]
 

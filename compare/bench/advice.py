@@ -13,7 +13,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from compare.bench.contact_law import Array, Contacts, geom_names, parameters
+from compare.bench.contact_law import Array, SoftContacts, geom_names, parameters
 from compare.bench.settled import Rest
 from mjsim import Coulomb
 
@@ -112,7 +112,7 @@ class AtRest:
     model: Any
     data: Any
     settled: Rest
-    contacts: Contacts
+    contacts: SoftContacts
     number: Array
     """By which `data` has them."""
     radius: Array
@@ -125,7 +125,7 @@ class AtRest:
     """What passes for good, of each, m."""
 
     @np.errstate(over="ignore")
-    def harm(self, c: Contacts) -> dict[str, Array]:
+    def harm(self, c: SoftContacts) -> dict[str, Array]:
         """How bad each contact is, (n,), by each of `FAULTS`: 1 passes for good."""
         law = c.law()
         speed = np.nan_to_num(np.fmax(law.creep, law.turning * self.radius))
@@ -186,7 +186,7 @@ def _with_own_values(model: Any, option: str) -> list[int]:
     return [int(geom) for geom in np.flatnonzero((values != UNNAMED[option]).any(1))]
 
 
-def _options(c: Contacts) -> Iterator[tuple[str, tuple[float, ...]]]:
+def _options(c: SoftContacts) -> Iterator[tuple[str, tuple[float, ...]]]:
     """Options that may help the contacts of a pair, and their values, the mildest first."""
     largest = 10 if c.pyramidal else 1e4  # edges that are harder still push the pair apart
     for power, digit in itertools.product((10, 100, 1e3, 1e4), (1, 2, 5)):
@@ -213,7 +213,7 @@ def _two_digits(value: float) -> float:
     return float(f"{value:.2g}")
 
 
-def _worst(c: Contacts, part: Array, quantity: str) -> float:
+def _worst(c: SoftContacts, part: Array, quantity: str) -> float:
     """The worst creep, m/s, or depth, m, or the largest stable step, s, of some contacts."""
     if quantity == "largest_step":
         return c.subset(part).largest_step()

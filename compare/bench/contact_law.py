@@ -33,7 +33,7 @@ SOLREF = (0.02, 1.0)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Contacts:
+class SoftContacts:
     """The n contacts of a settled model: options, their parameters, and their loads."""
 
     timestep: float
@@ -170,7 +170,7 @@ class Contacts:
         return np.asarray((low + high) / 2)
 
     @np.errstate(all="ignore")  # a contact without stiffness or friction divides by zero
-    def law(self) -> Law:
+    def law(self) -> ContactResponse:
         """What the contacts do under their loads."""
         load = self.force[:, 0]
         mu = self.friction
@@ -207,7 +207,7 @@ class Contacts:
         # one row, or all edges of a pyramid
         criterion = np.where((self.dim > 1) & self.pyramidal, 2 * self.dim - 2, 1)
         sideways = np.where(frictional & ~slides[:, None], sideways, 0)
-        return Law(
+        return ContactResponse(
             depth=depth - self.margin,
             creep=np.where(slides | (self.dim == 1), np.nan, np.hypot(creep[:, 0], creep[:, 1])),
             turning=np.where(slides | (self.dim <= 3), np.nan, np.hypot.reduce(creep[:, 2:], 1)),
@@ -218,7 +218,7 @@ class Contacts:
             damping=np.column_stack([b, *[b_f] * 5]),
         )
 
-    def subset(self, which: Array) -> Contacts:
+    def subset(self, which: Array) -> SoftContacts:
         """The contacts `which` alone, with their Jacobian in the coordinates that they move."""
         n = len(self.dim)
         chosen = {
@@ -263,7 +263,7 @@ class Contacts:
 
 
 @dataclass(frozen=True)
-class Law:
+class ContactResponse:
     """What n contacts do under their loads, nan where one slides or lacks that friction."""
 
     depth: Array
@@ -278,7 +278,7 @@ class Law:
     damping: Array
 
 
-def contacts(model: Any, data: Any) -> tuple[Contacts, Array]:
+def contacts(model: Any, data: Any) -> tuple[SoftContacts, Array]:
     """The contacts that carry more than a faint load at a state, and their numbers in `data`."""
     # in it each row is a direction of a contact, whatever the cone and the integrator
     twin = copy.copy(model)
@@ -313,7 +313,7 @@ def contacts(model: Any, data: Any) -> tuple[Contacts, Array]:
         jacobian = scipy.sparse.csr_array(sparse, (state.nefc, model.nv)).toarray()
         whitened = scipy.linalg.solve_triangular(np.linalg.cholesky(mass), jacobian.T, lower=True).T
         rows = whitened[row] * there[..., None]
-    described = Contacts(
+    described = SoftContacts(
         inverse_mass=state.efc_diagA[first],
         margin=state.efc_margin[first],
         force=force,
@@ -327,7 +327,7 @@ def contacts(model: Any, data: Any) -> tuple[Contacts, Array]:
 
 
 def parameters(model: Any, data: Any, number: Array) -> dict[str, Any]:
-    """What options of a model decide for these contacts, by the names in `Contacts`."""
+    """What options of a model decide for these contacts, by the names in `SoftContacts`."""
     option, own = model.opt, ("solref", "solreffriction", "solimp", "friction")
     return {
         "timestep": option.timestep,
@@ -339,7 +339,7 @@ def parameters(model: Any, data: Any, number: Array) -> dict[str, Any]:
     } | {name: getattr(data.contact, name)[number] for name in own}
 
 
-def replacements(model: Any, c: Contacts, names: Sequence[str]) -> Iterator[tuple[str, str]]:
+def replacements(model: Any, c: SoftContacts, names: Sequence[str]) -> Iterator[tuple[str, str]]:
     """Parameters of a pair in whose place the engine takes others: the kind, and how."""
     asked, imp, limits = c.solref[0], c.solimp[0], (mujoco.mjMINIMP, mujoco.mjMAXIMP)
     if (asked > 0).sum() == 1:

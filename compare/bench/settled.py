@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 import mujoco
 import numpy as np
 
-from compare.bench.contact_law import Array, Contacts
+from compare.bench.contact_law import Array, SoftContacts
 from model import InputError, StorageError
 from model.errors import few
 from model.parameters import ANY, POSITIVE, Range, check_number, parse_number
@@ -295,7 +295,7 @@ def loads_by_pair(model: Any, data: Any) -> dict[tuple[int, int], Array]:
 
 
 def measured_slip(
-    model: Any, data: Any, c: Contacts, number: Array, step: Advance, time: float
+    model: Any, data: Any, c: SoftContacts, number: Array, step: Advance, time: float
 ) -> dict[str, Array]:
     """How deep each contact is, and how fast its bodies slip and turn, in a window's mean."""
     found = data.contact

@@ -21,7 +21,7 @@ if TYPE_CHECKING:  # it takes half a second to load, and much that hands it over
 
 
 @dataclass(frozen=True)
-class Motion:
+class DrawnMotion:
     """A trajectory for a figure, by a name that stands for its content."""
 
     name: str
@@ -48,11 +48,11 @@ class Evidence:
         measured = (*self.records.measurements, *self.others.measurements)
         return (m for m in measured if m.quantity == quantity and named <= m.at.keys())
 
-    def motions(self, m: Measurement) -> list[Motion]:
+    def motions(self, m: Measurement) -> list[DrawnMotion]:
         """The runs of a measurement whose files are there."""
         paths = [(name, self.directory / name) for name in m.runs]
         return [
-            Motion(name, m.engine, m.parameters, partial(storage.load, path))
+            DrawnMotion(name, m.engine, m.parameters, partial(storage.load, path))
             for name, path in paths
             if storage.exists(path)
         ]
@@ -65,7 +65,7 @@ class Diagram:
     figure: str
     p: Parameters
     states: tuple[Measurement, ...] = ()
-    motions: tuple[Motion, ...] = ()
+    motions: tuple[DrawnMotion, ...] = ()
     checks: tuple[Check, ...] = ()
 
 

@@ -98,7 +98,7 @@ class Transient:
 
     @cached_property
     def exact(self) -> Trajectory:
-        """By the event-driven simulation, at the times of all runs, since blows don't let it be
+        """By the event-driven simulation, at the times of all runs, since impacts don't let it be
         interpolated."""
         sharp = analytic.Settings(rtol=1e-12)
         return analytic.simulate(

@@ -47,14 +47,14 @@ class Coulomb:
         least the way of a step at the speed of a fall through the scene, or a fifth of their
         radius. Margins are for steps up to the model's as it is now. While the law acts the
         integrator is Euler's, and dampers are inertia of the same effect, which contacts know
-    restitution : share of its normal speed with which a rigid contact parts after a blow, 0 … 1; or
-        one for each geom, of which two in contact have the larger, as MuJoCo mixes friction
+    restitution : share of its normal speed with which a rigid contact parts after an impact, 0 … 1;
+        or one for each geom, of which two in contact have the larger, as MuJoCo mixes friction
     kinetic : friction of contacts that slide, in units of the friction that keeps them from it,
         0.001 … 1
-    servo : time in which soft contacts lose their depth, s; None: they sink in as MuJoCo has
-        them. It needs geoms with a `margin`, more than bodies sink in, of which an open contact
-        then takes no notice; and it must be slower than the contact, best five times the time
-        constant of `solref`
+    servo : Baumgarte stabilisation: time in which soft contacts lose their depth, s; None: they
+        sink in as MuJoCo has them. It needs geoms with a `margin`, more than bodies sink in, of
+        which an open contact then takes no notice; and it must be slower than the contact, best
+        five times the time constant of `solref`
     share : share of gravity to which a step must know beforehand how contacts slip, and what rigid
         ones bear; if it doesn't, it is solved again
     depth : depth that rigid contacts keep at a time step of 2 ms, in units of the smaller radius;
@@ -135,7 +135,7 @@ class Coulomb:
         if kind not in _INTEGRATORS or (rigid and kind == _RK4):
             name = mujoco.mjtIntegrator(kind).name.removeprefix("mjINT_")
             own = "computes reference accelerations of its own"
-            why = "is of another order than blows" if kind == _RK4 else own
+            why = "is of another order than impacts" if kind == _RK4 else own
             raise ValueError(
                 f"integrator = {name} {why}; Coulomb's law needs Euler, implicit or implicitfast"
             )

@@ -1,8 +1,8 @@
 """Rigid contacts: Moreau and Jean's time stepping in MuJoCo's rows, and bodies that turn freely.
 
 A closed contact asks for the velocity at the end of the step: none, or Newton's share of that
-before a blow (Moreau 1988; Jean 1999, Comput. Methods Appl. Mech. Eng. 177). One that is open may
-close its gap. Friction of what slides on opposes its slip in the middle of the step.
+before an impact (Moreau 1988; Jean 1999, Comput. Methods Appl. Mech. Eng. 177). One that is open
+may close its gap. Friction of what slides on opposes its slip in the middle of the step.
 """
 
 from __future__ import annotations
@@ -53,8 +53,8 @@ def stiffen(model: Any, data: Any, memory: Any, gravity: float) -> None:
 def velocity_to_ask_for(model: Any, memory: Any, contact: Any, fastest: float) -> float:
     """Normal velocity that closes a gap in the step, or takes a share of a depth away, m s-1.
 
-    So it does of the gap of a contact that has borne something: closed at once, that would be a
-    blow.
+    So it does of the gap of a contact that has borne something: closed at once, that would be an
+    impact.
     """
     h, law = model.opt.timestep, memory.law
     if contact.gap > 0:
@@ -65,7 +65,7 @@ def velocity_to_ask_for(model: Any, memory: Any, contact: Any, fastest: float) -
 
 @kernel
 def restitution_of(memory: Any, contact: Any) -> float:
-    """Share of its normal speed with which a contact parts after a blow: the larger of its
+    """Share of its normal speed with which a contact parts after an impact: the larger of its
     geoms'."""
     given = reals(memory.restitution_at, memory.bounces)
     return float(max(given[contact.geoms[0]], given[contact.geoms[1]]))
@@ -75,7 +75,7 @@ def restitution_of(memory: Any, contact: Any) -> float:
 def rebound(
     restitution: float, gap: float, speed: float, fall: float, h: float, gravity: float
 ) -> float:
-    """Speed after a blow that keeps Newton's share of the energy with which a fall ends, m s-1.
+    """Speed after an impact that keeps Newton's share of the energy with which a fall ends, m s-1.
 
     `fall` is what the step adds to the speed. Euler's method keeps v²/2 + gz - hgv/2 in flight.
     """
@@ -110,7 +110,8 @@ def share_softness(model: Any, data: Any, memory: Any) -> None:
 
 @kernel
 def take_depth_away(model: Any, data: Any, memory: Any) -> None:
-    """Move the distance that a soft contact holds, until under its load it has no depth."""
+    """Baumgarte stabilisation: move the distance that a soft contact holds, until under its load it
+    has no depth."""
     contacts, spring = contacts_of(memory), reals(data.efc_KBIP, (data.nefc, 4))
     reference = reals(data.efc_aref, data.nefc)
     for i in range(memory.contacts):
@@ -128,15 +129,15 @@ def oppose_slip_at_mid_step(model: Any, data: Any, memory: Any, gravity: float) 
     """Let friction of what slides fast oppose its slip at mid step; whether there is any.
 
     That is of second order; where slip may end within the step, it must oppose that at the end, and
-    in a blow, where a load changes by more than a weight, that after it (Moreau).
+    in an impact, where a load changes by more than a weight, that after it (Moreau).
     """
     contacts, rows, h, some = contacts_of(memory), rows_of(memory), model.opt.timestep, False
     velocity, estimate = reals(data.efc_vel, data.nefc), reals(data.efc_diagA, data.nefc)
     for i in range(memory.contacts):
         contact = contacts[i]
         gained = rows[contact.address].remembered - contact.load
-        blow = abs(gained) * estimate[contact.address] > gravity
-        if contact.state != SLIDES or contact.predicted == 0 or blow:
+        impact = abs(gained) * estimate[contact.address] > gravity
+        if contact.state != SLIDES or contact.predicted == 0 or impact:
             continue
         speed, change = 0.0, 0.0
         for t in range(contact.dim - 1):
@@ -181,9 +182,9 @@ def add_dampers(model: Any, data: Any, memory: Any) -> None:
         joint = target[k, 0]
         if bias[k] == AFFINE and kind[k] == JOINT and types[joint] >= SLIDE:
             i = dofs[joint]
-            servo = -numbers[k, 2] * gear[k, 0] ** 2
-            inertia[starts[i] + lengths[i] - 1] += memory.dampers[1] * servo
-            some = some or servo != 0
+            damper = -numbers[k, 2] * gear[k, 0] ** 2
+            inertia[starts[i] + lengths[i] - 1] += memory.dampers[1] * damper
+            some = some or damper != 0
     if some:
         mj_factorM(memory.model, memory.data)
 

@@ -17,7 +17,7 @@ from compare import plot
 from compare.catalogue import CLAIMS
 from compare.gallery import FIGURES, figures_of
 from compare.kit import collection, style
-from compare.kit.drawing import Diagram, Evidence, GapError, Motion
+from compare.kit.drawing import Diagram, DrawnMotion, Evidence, GapError
 from compare.kit.record import Check, Records
 from compare.subjects.attractors import figures as attractors
 from compare.subjects.flowmeter import figures as flowmeter
@@ -143,7 +143,7 @@ def test_a_fall_that_did_not_happen_is_a_gap():
     run = analytic.simulate(p, [0, 0, p.omega_0, 0, 0, 0], 0.1)
     with pytest.raises(GapError, match="never landed"):
         flowmeter.draw_fall(
-            Diagram("unloading", p, motions=(Motion("rolling", "event", p, lambda: run),))
+            Diagram("unloading", p, motions=(DrawnMotion("rolling", "event", p, lambda: run),))
         )
 
 
