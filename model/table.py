@@ -147,9 +147,7 @@ def label(name: str, unit: str) -> str:
 
 
 def write(
-    path: Path,
-    columns: Mapping[str, Sequence[Any]],
-    tell: Callable[[float], object] = float,
+    path: Path, columns: Mapping[str, Sequence[Any]], tell: Callable[[float], object] = float
 ) -> None:
     """Write columns of numbers and text by their labels as CSV, whole or not at all; raises
     `StorageError`. `tell` is called with the fraction done."""

@@ -52,12 +52,7 @@ def shortest_time(
 
 
 def check_timestep(
-    timestep: float,
-    p: Parameters,
-    flow: Flow,
-    t_end: float,
-    c: Callable[[float], float],
-    x0: State,
+    timestep: float, p: Parameters, flow: Flow, t_end: float, c: Callable[[float], float], x0: State
 ) -> None:
     """`InputError` for a step beyond half of `shortest_time`; every engine that takes steps is held
     to this."""

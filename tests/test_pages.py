@@ -24,10 +24,7 @@ PAGES = [
     *sorted(DOCS.glob("*.md")),
     *sorted(DOCS.glob("notebooks/*.py")),
 ]
-WRITTEN = [
-    ROOT / "mjsim" / "coulomb" / "README.md",
-    *sorted(DOCS.glob("records/**/*.md")),
-]
+WRITTEN = [ROOT / "mjsim" / "coulomb" / "README.md", *sorted(DOCS.glob("records/**/*.md"))]
 """Pages that say what was done and how; their commands exist, and may take hours."""
 LIMITS = {"README.md": 700, "CHANGELOG.md": 1500}
 """Words of a page, at most."""
@@ -126,10 +123,7 @@ NEEDS_MORE = {
 """What isn't run as printed, by a word of it, and why."""
 
 
-MADE = (
-    "simulate --time 1 -o run.h5",
-    "calibrate --parameters mine.toml -o curve.csv",
-)
+MADE = ("simulate --time 1 -o run.h5", "calibrate --parameters mine.toml -o curve.csv")
 """What pages take for made before."""
 SWEEP = "dualball sweep --vary eta=0.1,0.2 --time 0.1 --workers 0"
 """The same, of pages that carry none out themselves."""

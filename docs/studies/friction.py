@@ -225,11 +225,7 @@ def falling(count: int, rounds: int, way: dict[str, Any]) -> float:
 
 def costs() -> Rows:
     """What a step costs, in units of plain MuJoCo's."""
-    ways = {
-        "soft": SOFT,
-        "soft, installed": SOFT | {"door": Installed},
-        "rigid": RIGID,
-    }
+    ways = {"soft": SOFT, "soft, installed": SOFT | {"door": Installed}, "rigid": RIGID}
     scenes: dict[str, Callable[[dict[str, Any]], float]] = {
         **{
             f"at rest, {count} contacts": functools.partial(at_rest, count)

@@ -32,9 +32,7 @@ def dualball(where, *words, before="", **environment):
         if not name.startswith(("PYTHON", "LC_", "LANG"))
     }
     shell = ["bash", "-c", f'"$@" {before}', "bash", sys.executable, "-m", "compare", *words]
-    own = {
-        "PYTHONPATH": str(ROOT),
-    } | environment  # to load what is compiled takes longer
+    own = {"PYTHONPATH": str(ROOT)} | environment  # to load what is compiled takes longer
     done = subprocess.run(shell, cwd=where, env=kept | own, capture_output=True, timeout=120)
     assert b"Traceback" not in done.stdout + done.stderr, done.stderr
     assert b"Exception ignored" not in done.stderr

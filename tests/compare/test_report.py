@@ -375,10 +375,7 @@ def test_conditions_are_said_with_their_units_and_a_state_without_what_is_zero()
 @pytest.mark.parametrize(
     ("text", "shown"),
     [
-        (
-            "ω̃_x, ω₀₂ > A_z",
-            "<i>ω̃</i><sub>x</sub>, <i>ω</i><sub>02</sub> &gt; <i>A</i><sub>z</sub>",
-        ),
+        ("ω̃_x, ω₀₂ > A_z", "<i>ω̃</i><sub>x</sub>, <i>ω</i><sub>02</sub> &gt; <i>A</i><sub>z</sub>"),
         ("(g - Rω₀²)/c", "(<i>g</i> − <i>R</i><i>ω</i><sub>0</sub>²)/<i>c</i>"),
         (
             "r = 0.2 m, 8πρ_fνr/(jm)",

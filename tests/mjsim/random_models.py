@@ -9,9 +9,7 @@ ASSETS = (
     '<asset><mesh name="tetra" vertex="0 0 0 .1 0 0 0 .1 0 0 0 .1"/>'
     '<hfield name="hill" nrow="3" ncol="3" size="2 2 .1 .1" elevation="0 0 0 0 1 0 0 0 0"/></asset>'
 )
-SIZES = {
-    **{"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3},
-}
+SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
 
 
 def model(seed: int, rigid: bool) -> mujoco.MjModel:

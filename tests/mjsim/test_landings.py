@@ -69,7 +69,7 @@ def test_landing_gives_the_impulses_of_impact(spin) -> None:
     )
 
 
-def test_in_a_blow_all_friction_opposes_the_slip_after_it() -> None:
+def test_in_an_impact_all_friction_opposes_the_slip_after_it() -> None:
     """A ball that slides along the wall comes down and slides on on both: when the wall's friction
     opposed its slip in the middle of the step, that came out 0.09 rad/s wrong at any step."""
     p = REFERENCE.replace(omega_0=12.0461)

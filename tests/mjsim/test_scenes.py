@@ -66,7 +66,7 @@ def test_nothing_brakes_what_rolls():
     assert min(braked.values.values()) > 10 * max(plain.values.values())
 
 
-def test_blows_of_a_cradle_stay_as_they_are():
+def test_impacts_of_a_cradle_stay_as_they_are():
     plain, soft = both(small_scenes.cradle)
     assert soft.values == pytest.approx(plain.values, abs=0.02)
 

@@ -212,11 +212,7 @@ def section(
         own = [(e.verdict.claim, e.engines[name].outcome) for e in said if name in e.engines]
         alarms = [c.id for c, o in own if o is Outcome.REFUTED is not c.expected]
         confirmed = sum(outcome is Outcome.CONFIRMED for _, outcome in own)
-        row = [
-            name,
-            str(sum(name in each.by for each in detections)),
-            f"{confirmed} of {len(own)}",
-        ]
+        row = [name, str(sum(name in each.by for each in detections)), f"{confirmed} of {len(own)}"]
         beyond = [f"{off[name].beyond(n):.1%}" if name in off else "–" for n in (1, 2, 3)]
         numbers = str(len(off[name].sizes)) if name in off else "0"
         counts.append([*row, ", ".join(alarms) or "none", numbers, *beyond])

@@ -104,10 +104,7 @@ def wrong_theory(
     exec(compile(ast.fix_missing_locations(module), what, "exec"), plain.__globals__, defined)
     put = defined[plain.__name__]
     return WrongTheory(
-        what,
-        plain.__module__,
-        plain.__name__,
-        lambda right, *args, **named: put(*args, **named),
+        what, plain.__module__, plain.__name__, lambda right, *args, **named: put(*args, **named)
     )
 
 

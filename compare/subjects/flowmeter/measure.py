@@ -25,14 +25,7 @@ from numpy.polynomial import Polynomial
 from compare.kit import settling
 from compare.kit.conditions import Conditions, state_of
 from compare.kit.programme import Protocol
-from compare.kit.record import (
-    Measured,
-    Measurement,
-    Missing,
-    Records,
-    Sets,
-    if_found,
-)
+from compare.kit.record import Measured, Measurement, Missing, Records, Sets, if_found
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.settling import SettlingCriteria, SteadyState

@@ -29,14 +29,7 @@ import numpy as np
 
 from compare.kit.conditions import Conditions, state_of
 from compare.kit.programme import Protocol
-from compare.kit.record import (
-    Measured,
-    Measurement,
-    Missing,
-    Records,
-    Sets,
-    if_found,
-)
+from compare.kit.record import Measured, Measurement, Missing, Records, Sets, if_found
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import dragged_speed, slip_unit, time_unit
 from compare.kit.settling import settle_groups, starts_at

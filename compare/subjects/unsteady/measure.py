@@ -28,14 +28,7 @@ from compare.kit.brackets import Attempt, Bracket, Search, narrow
 from compare.kit.conditions import Conditions, state_of
 from compare.kit.programme import Protocol
 from compare.kit.quantities import QUANTITIES
-from compare.kit.record import (
-    Measured,
-    Measurement,
-    Missing,
-    Records,
-    Sets,
-    if_found,
-)
+from compare.kit.record import Measured, Measurement, Missing, Records, Sets, if_found
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.settling import rounded_duration, settle
 from compare.kit.statistics import COVERAGE, Estimate, estimate, peaks, top, uniform
