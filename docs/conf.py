@@ -62,9 +62,8 @@ nb_execution_timeout = 600  # a machine may be busy
 nb_merge_streams = True
 nb_render_markdown_format = "myst"
 os.environ |= {"COLUMNS": "100", "NO_COLOR": "1", "TERM": "dumb"}
-os.environ["PATH"] = (
-    f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"  # for !dualball
-)
+# for !dualball
+os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
 myst_enable_extensions = ["dollarmath", "attrs_inline"]
 myst_heading_anchors = 3
 
@@ -73,9 +72,8 @@ highlight_language = "text"
 autodoc_type_aliases = {"npt.ArrayLike": "ArrayLike", "Array": "Array"}
 suppress_warnings = ["ref.python"]  # two classes of one name in an annotation: neither is linked
 autodoc_member_order = "bysource"
-toc_object_entries = (
-    False  # a page lists its modules; with all they have a build takes half as long again
-)
+# a page lists its modules; with all they have a build takes half as long again
+toc_object_entries = False
 autodoc_mock_imports = [
     "dartpy",
     "mujoco_warp",
@@ -173,9 +171,8 @@ def source_links(app: Sphinx, where: object, *source: list[str]) -> None:
     """Links to modules, which a repository shows as files, lead to the reference; those to tests
     are only names."""
     text = source[-1]  # of a page, or of what a page includes
-    if str(where).startswith(
-        "records/attractors/"
-    ):  # tables written by `dualball attractors --page`, to which a page links
+    # tables written by `dualball attractors --page`, to which a page links
+    if str(where).startswith("records/attractors/"):
         text[0] = f"---\norphan: true\n---\n\n{text[0]}"
 
     def to_reference(link: re.Match[str]) -> str:
@@ -211,14 +208,12 @@ def as_typed(app: Sphinx, tree: nodes.document) -> None:
             block[:] = [nodes.Text(rest.lstrip())]
         block.rawsource = block.astext()
     for said in list(tree.findall(addnodes.desc_annotation)):
-        if (
-            said.astext().startswith(" = ") and len(said.astext()) > 100
-        ):  # a table, which its module shows better
+        # a table, which its module shows better
+        if said.astext().startswith(" = ") and len(said.astext()) > 100:
             said.parent.remove(said)
     entry: addnodes.desc | None = None
-    for each in list(
-        tree.findall(addnodes.desc)
-    ):  # constants that are declared together have one text
+    # constants that are declared together have one text
+    for each in list(tree.findall(addnodes.desc)):
         if (
             entry
             and each["objtype"] == entry["objtype"] == "data"
@@ -254,9 +249,8 @@ def symbols(app: Sphinx, tree: nodes.document) -> None:
         up, shown = text.parent, typeset(text.astext())
         while up and not isinstance(up, _AS_IT_IS):
             up = up.parent
-        if (
-            up is None and "<" in shown and "rhdf5" not in text.parent.astext()
-        ):  # R is a program there
+        # R is a program there
+        if up is None and "<" in shown and "rhdf5" not in text.parent.astext():
             text.parent.replace(text, nodes.raw("", shown, format="html"))
 
 
@@ -265,9 +259,8 @@ def docstring(
 ) -> None:
     """Plain text with `names` between backticks and sections of numpy's kind, as
     reStructuredText."""
-    text = (
-        "" if lines[:1] and lines[0].startswith("Alias for field number") else "\n".join(lines)
-    )  # says nothing
+    # says nothing
+    text = "" if lines[:1] and lines[0].startswith("Alias for field number") else "\n".join(lines)
     text = re.sub(r"^(\w+)\n-{3,}$", r"**\1**\n", text, flags=re.MULTILINE)
     text = re.sub(r"^(\w[\w, ]*) : ", r"``\1``\n    ", text, flags=re.MULTILINE)
     text = re.sub(r"(^\S.*\n)\n(?= {4}\S)", r"\1\n::\n\n", text, flags=re.MULTILINE)

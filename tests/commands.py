@@ -59,9 +59,8 @@ def refused(capsys: pytest.CaptureFixture[str], *argv: object) -> str:
 def started(*words: object, **how: Any) -> subprocess.Popen[str]:
     """A command in a process of its own, which hears Ctrl-C even if a shell ran the tests in the
     background."""
-    env = {
-        key: value for key, value in os.environ.items() if not key.startswith("PYTEST")
-    }  # NiceGUI looks for it
+    # NiceGUI looks for it
+    env = {key: value for key, value in os.environ.items() if not key.startswith("PYTEST")}
     return subprocess.Popen(
         [sys.executable, "-m", "compare", *map(str, words)],
         env=env | {"PYTHONPATH": str(ROOT)},

@@ -53,9 +53,8 @@ class Warp(mujoco_free.Bodies):
         return q[-7:-4], v[-6:-3], rotated(q[-4:], v[-3:])
 
     def push(self, force: Vector) -> None:
-        self.data.xfrc_applied.numpy()[0, self.number, :3] = (
-            force  # on a processor the engine's own memory
-        )
+        # on a processor the engine's own memory
+        self.data.xfrc_applied.numpy()[0, self.number, :3] = force
 
 
 defaults = Warp("mujoco-warp-defaults", _WORST)

@@ -87,9 +87,8 @@ class Newton(Free):
         return place[:3], rate[:3], rate[3:]
 
     def push(self, force: Vector) -> None:
-        self.old.body_f.numpy()[self.number, :3] = (
-            force  # on a processor this is the engine's own memory
-        )
+        # on a processor this is the engine's own memory
+        self.old.body_f.numpy()[self.number, :3] = force
 
     def turn(self, point: Array, normal: Array, velocity: Array) -> None:
         self.old.body_q.numpy()[self.wall] = pose(point, normal)

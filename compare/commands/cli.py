@@ -32,9 +32,8 @@ def program() -> NoReturn:
     What standard output can't show in its encoding is spelled."""
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="spelled")
-    os.environ["MPLBACKEND"] = (
-        "agg"  # figures go into files: that of a notebook would be looked for here, too
-    )
+    # figures go into files: that of a notebook would be looked for here, too
+    os.environ["MPLBACKEND"] = "agg"
     os.environ["MUJOCO_GL"] = "disable"  # nothing draws with OpenGL
     # threads of OpenBLAS wait for one another by spinning, which is most of their time where others
     # are at work, too

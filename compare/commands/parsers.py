@@ -105,9 +105,8 @@ def figures(parser: Parser) -> None:
         metavar="NAME",
         help="svg (default), pdf or png; may be repeated",
     )
-    parser.excludes(
-        "--results", "--parameters", "--set"
-    )  # it shows what was measured, they what theory says of a set
+    # it shows what was measured, they what theory says of a set
+    parser.excludes("--results", "--parameters", "--set")
 
 
 @command("the ball", "predict.show_parameters", "--set steel-in-water")

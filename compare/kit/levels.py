@@ -47,12 +47,10 @@ class Sampling:
 
     halves: tuple[int, int] = (1, 2)  # what the time step of a pair of runs is divided by
     field_steps: tuple[int, int, int] = (1, 2, 4)  # the same, of three runs
-    sections: int = (
-        1  # flows inside a bracket in each round, by which it shrinks to a half or an eighth
-    )
-    granted: bool = (
-        False  # whether the ends between which something is looked for are taken for granted
-    )
+    # flows inside a bracket in each round, by which it shrinks to a half or an eighth
+    sections: int = 1
+    # whether the ends between which something is looked for are taken for granted
+    granted: bool = False
     # whether that is measured that takes long: sinking next to the least flow that holds, folds
     slow: bool = True
 
@@ -66,9 +64,8 @@ class Sampling:
     settled_starts: tuple[tuple[str, Flows], ...] = tuple((how, _FEW) for how in _STARTS)
     settled_sharp: float = 1.0  # share of the drift limit down to which a state goes on
     settled_loose: float = 1.0  # and the multiple of it up to which it counts
-    settled_divisor: int = (
-        2  # parts of the time step with which a state is measured once more; 1: it isn't
-    )
+    # parts of the time step with which a state is measured once more; 1: it isn't
+    settled_divisor: int = 2
 
     thresholds_width: float = 5e-5  # relative width of the last brackets
     thresholds_fold: float = 6e-4  # and of those about a fold
@@ -94,9 +91,8 @@ class Sampling:
     pulsation_steps: int = 512  # least number of time steps in a period
     pulsation_samples: int = 256  # in a period
     pulsation_divisor: int = 2  # parts of the time step in the last of successive runs
-    pulsation_reach: float = (
-        1.1  # largest amplitude tried, in units of what would end rolling in a slow pulsation
-    )
+    # largest amplitude tried, in units of what would end rolling in a slow pulsation
+    pulsation_reach: float = 1.1
     pulsation_width: float = 1e-3  # relative width to which the onset of slip is bracketed
     unloading_divisors: tuple[int, int] = (16, 32)  # of the coarse step, where the ball lands
 

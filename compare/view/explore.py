@@ -122,10 +122,8 @@ def characteristic(p: Parameters, start: float, fastest: float) -> Figure:
         for text, part, dash in (("SS", ~grows, "solid"), ("SS, unstable", grows, "dash")):
             lines.append((text, Case.SS, flows, np.where(part, x.omega_c, np.nan), dash))
     if np.isfinite(rides) and rides < fastest:
-        for case, dash in (
-            (Case.SR, "solid"),
-            (Case.NR, "12px,12px"),
-        ):  # on one line their colours take turns
+        # on one line their colours take turns
+        for case, dash in ((Case.SR, "solid"), (Case.NR, "12px,12px")):
             lines.append((case.name, case, [rides, fastest], [rides, fastest], dash))
     data = [
         {"type": "scatter", "mode": "lines", "name": text, "x": np.asarray(x).tolist(),
@@ -383,9 +381,8 @@ def _controls(ui: Any, tab: Tab, draw: list[Callable[[], None]]) -> Callable[[],
             return None
 
     async def again(mine: int) -> None:
-        if (
-            mine == tab.asked and (found := await simulate()) and mine == tab.asked
-        ):  # nothing else was asked meanwhile
+        # nothing else was asked meanwhile
+        if mine == tab.asked and (found := await simulate()) and mine == tab.asked:
             tab.run = found
             tab.play()
 
@@ -427,9 +424,8 @@ def _controls(ui: Any, tab: Tab, draw: list[Callable[[], None]]) -> Callable[[],
             number = ui.number(value=round(value(name), 4), step=step, format="%.4g").classes(
                 "w-24"
             )
-            number.bind_value(slider).props("debounce=500").on(
-                "blur", show
-            )  # not at each digit; what is refused goes
+            # not at each digit; what is refused goes
+            number.bind_value(slider).props("debounce=500").on("blur", show)
     laws = ui.select(list(drag.LAWS), value=tab.p.drag, label="law of drag").classes("w-40")
     laws.on_value_change(partial(change, "drag"))
     line = ui.html("", sanitize=False).classes("text-sm said")

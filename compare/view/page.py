@@ -117,7 +117,6 @@ def write(
         raise InputError(
             "this NiceGUI has no three.js where version 3 has it: pip install 'nicegui>=3.18'"
         ) from None
-    three = (
-        "data:text/javascript;base64," + base64.b64encode(source).decode()
-    )  # with its controls, as a module
+    # with its controls, as a module
+    three = "data:text/javascript;base64," + base64.b64encode(source).decode()
     return render("compare.view", "motion.html", three=three, about=about, motion=motion, **told)

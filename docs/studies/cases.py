@@ -67,9 +67,8 @@ def _contact(axes: Axes, contact: Contact, at: tuple[float, float], along: tuple
     if contact is Contact.R:
         axes.plot(*at, "ko", ms=6)
     elif contact is Contact.S:
-        inside = (
-            0.1 * np.array(along[::-1]) * (-1, 1)
-        )  # in the ball, clear of the line of floor or wall
+        # in the ball, clear of the line of floor or wall
+        inside = 0.1 * np.array(along[::-1]) * (-1, 1)
         ends = [tuple(np.array(at) + inside + side * 0.34 * np.array(along)) for side in (-1, 1)]
         axes.add_patch(
             FancyArrowPatch(

@@ -28,9 +28,8 @@ def test_thresholds_that_do_not_exist():
     assert missing() == set()
     assert missing(eta=0.6) == {"omega_01", "omega_04"}
     assert missing(eta=0.0) == {"omega_02", "omega_04"}
-    assert (
-        missing(eta=0.02) == missing(c=0.0) == missing(mu=0.0) == {"omega_04"}
-    )  # the first is below eta_cr
+    # the first is below eta_cr
+    assert missing(eta=0.02) == missing(c=0.0) == missing(mu=0.0) == {"omega_04"}
     assert missing(mu=0.0, c=0.0) == {"omega_04", "eta_cr"}
     assert thresholds(P.replace(mu=0.0)).omega_01 == 0
     assert thresholds(P.replace(mu=0.0)).eta_cr == np.inf

@@ -18,11 +18,8 @@ EPS = sys.float_info.epsilon
 def assert_obeys(P_n, v_n, target, P_t, v_t, friction, tiny):
     """0 <= P_n, v_n >= target, one of them tight; friction in its disk, and against the slip
     (maximal dissipation)."""
-    slip, limit, least = (
-        math.hypot(*v_t),
-        friction * P_n,
-        sys.float_info.min,
-    )  # below which digits are lost
+    # below which digits are lost
+    slip, limit, least = math.hypot(*v_t), friction * P_n, sys.float_info.min
     assert P_n >= 0
     assert v_n >= target - tiny
     assert P_n == 0 or v_n <= target + tiny

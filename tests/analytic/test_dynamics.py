@@ -52,9 +52,8 @@ def equations(case):
     v_A, v_B = v_C + spin.cross(A), v_C + spin.cross(B)
     drag, weight = -m * c * (v_C - sp.Matrix([0, 0, rho * omega_0])), sp.Matrix([0, -m * g, 0])
     newton = weight + FORCE_A + FORCE_B + drag - m * (v_C.diff(t) + frame.cross(v_C))
-    turning = (
-        j * m * r**2 * (spin.diff(t) + frame.cross(spin))
-    )  # omega x J omega vanishes for a sphere
+    # omega x J omega vanishes for a sphere
+    turning = j * m * r**2 * (spin.diff(t) + frame.cross(spin))
     found = [
         *newton,
         *(A.cross(FORCE_A) + B.cross(FORCE_B) - turning),
@@ -135,10 +134,8 @@ def furthest_off(case, law, mu, eta, omega_0):
     rho, fastest = p.R - h, np.abs(slips).sum(axis=0)
     c = resistance(np.sqrt(v_h**2 + v_y**2 + (rho * (omega_c - p.omega_0)) ** 2), p)
     (A_x, _, A_z), (_, B_y, B_z) = (v.T for v in slip_velocities(x, p))
-    angles = (
-        np.arctan2(-A_z, A_x),
-        np.arctan2(B_z, -B_y),
-    )  # alpha and beta (8), not used where nothing slips
+    # alpha and beta (8), not used where nothing slips
+    angles = np.arctan2(-A_z, A_x), np.arctan2(B_z, -B_y)
     known = solved(case)(p.m, p.r, p.R, p.j, mu, eta, p.g, c, p.omega_0, *angles, *x.T)
     expected = np.stack(np.broadcast_arrays(*known, x[:, 0]), axis=-1)[:, :14]
     drag = c * (np.abs(v_y) + np.abs(v_h) + rho * (np.abs(omega_c) + abs(omega_0)))

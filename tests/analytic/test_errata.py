@@ -48,9 +48,8 @@ def test_equation_40():
     for omega_c in np.geomspace(0.5, 60.0, 15):
         for alpha in np.linspace(0.5 * np.pi, 1.5 * np.pi, 99)[1:-1]:
             unit = [0.0, 0.0, omega_c, np.sin(alpha), 0.0, np.cos(alpha), 0.0, 0.0]
-            F_A, F_B = contact_forces(
-                Case.SS, unit, P
-            )  # they depend on the directions of slip alone
+            # they depend on the directions of slip alone
+            F_A, F_B = contact_forces(Case.SS, unit, P)
             slip_z = -F_A[2] / (P.j * P.m * P.r * omega_c)
             size = slip_z / np.cos(alpha)
             if F_A[1] >= 0 and F_B[0] >= 0 and size > 0:

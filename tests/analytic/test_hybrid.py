@@ -95,9 +95,8 @@ def test_rolling_ends_where_no_forces_are_left():
     assert run.slip_z[-1] / sooner == pytest.approx(4.0, rel=0.05)
 
 
-@pytest.mark.parametrize(
-    ("method", "error"), [("event", 1e-9), ("time-stepping", 4e-6)]
-)  # the square of its step
+# the square of its step
+@pytest.mark.parametrize(("method", "error"), [("event", 1e-9), ("time-stepping", 4e-6)])
 @pytest.mark.parametrize(
     "flow",
     [

@@ -88,7 +88,6 @@ def test_the_mirror_image_and_where_nothing_moves():
     assert back.omega_c == -there.omega_c
     assert (back.shift, back.friction) == (there.shift, there.friction)
     assert np.isnan(real_fluid.rolling(p.replace(omega_0=0.0)).shift)
-    assert (
-        real_fluid.model_error(p.replace(omega_0=0.0)) > real_fluid.LIMIT
-    )  # by the fluid's inertia alone
+    # by the fluid's inertia alone
+    assert real_fluid.model_error(p.replace(omega_0=0.0)) > real_fluid.LIMIT
     assert real_fluid.model_error(Parameters.named("reference")) == 0.0

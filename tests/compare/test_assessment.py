@@ -39,11 +39,8 @@ SERIES = (
     (0.3 * RATIOS, 1e-12, 1.0),
     (0.3 * RATIOS**2, 1e-12, 2.0),
     (0.1 * RATIOS + 0.02 * RATIOS**2, 1e-12, 1.13),
-    (
-        [1.28e-3, -3.7e-4, -4.7e-4],
-        1e-14,
-        None,
-    ),  # terms of two orders cancel: -2.8e-3 h + 4.1e-3 h^2
+    # terms of two orders cancel: -2.8e-3 h + 4.1e-3 h^2
+    ([1.28e-3, -3.7e-4, -4.7e-4], 1e-14, None),
     (0.01 * np.sqrt(RATIOS), 1.4e-4, ...),
     ([1.102e-2, 6.33e-3, 5.39e-3, 4.8e-3], 1.4e-4, ...),  # as where heavy-core loses the floor
     ([1e-3, -2e-3, 5e-4, -5e-4], 1e-3, None),  # noise: the last is the limit
@@ -190,6 +187,5 @@ def test_an_engine_is_asked_every_bearing_on_every_set_that_it_shares(lost, outc
     flows = tuple(measured("thresholds", "omega_03", P.omega_0, 1e-6, P, name) for name in sets)
     own = Records(counts + flows[lost:])
     assert said(dict.fromkeys((1, 2, 3), own), Records(counts + flows), of).outcome is outcome
-    assert (
-        full_verdict(of, {"mujoco": {1: Records(counts)}}).outcome is Outcome.NOT_RUN
-    )  # counts confirm no number
+    # counts confirm no number
+    assert full_verdict(of, {"mujoco": {1: Records(counts)}}).outcome is Outcome.NOT_RUN

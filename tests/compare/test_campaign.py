@@ -384,9 +384,8 @@ def test_a_sweep_that_is_interrupted_or_killed_loses_nothing_that_was_done(tmp_p
         while len(written(tmp_path)) == len(kept):
             time.sleep(0.02)
         process.send_signal(by)
-        said, _ = process.communicate(
-            timeout=60
-        )  # the pipe ends once the worker, which holds it, too, is gone
+        # the pipe ends once the worker, which holds it, too, is gone
+        said, _ = process.communicate(timeout=60)
         assert "Traceback" not in said
         assert kept.items() < written(tmp_path).items()
         kept = written(tmp_path)

@@ -76,9 +76,8 @@ def newton(case, touching=None, friction=()):
         axes = rotated(state[3:7], np.eye(3)).T
         inertia = axes @ np.diag(body.inertia) @ axes.T
         linear = np.array(case.force(t, state[:3], velocity)) / body.mass - case.g * UP
-        found = np.concatenate(
-            [linear, np.linalg.solve(inertia, -np.cross(spin, inertia @ spin))]
-        )  # without contacts
+        # without contacts
+        found = np.concatenate([linear, np.linalg.solve(inertia, -np.cross(spin, inertia @ spin))])
         if count:
             now, after, before = (
                 np.array(touching(state[:7] + d * begin)) for d in (0.0, near, -near)
@@ -88,11 +87,8 @@ def newton(case, touching=None, friction=()):
                 np.vstack([np.eye(3) / body.mass, np.linalg.solve(inertia, cross)])
                 for cross in crosses
             ]
-            of_forces, rows, right = (
-                np.hstack(pushed),
-                [],
-                [],
-            )  # rows of what all forces must come to
+            # rows of what all forces must come to
+            of_forces, rows, right = np.hstack(pushed), [], []
             for k, ((arm, normal, under), rate) in enumerate(
                 zip(now, (after - before) / (2 * near), strict=True)
             ):

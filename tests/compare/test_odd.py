@@ -273,9 +273,8 @@ def test_bad_inputs_drawn_from_the_parsers_are_refused(command: str, here: Path)
     assert not {line: of for line, of in wrong.items() if of}
 
 
-@pytest.mark.filterwarnings(
-    "ignore::pytest.PytestUnraisableExceptionWarning"
-)  # Ctrl-C between open() and with
+# Ctrl-C between open() and with
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.parametrize("count", [3, pytest.param(100, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("command", COMMANDS)
 def test_odd_lines(

@@ -37,9 +37,8 @@ def test_a_ball_that_settles(theory):
             assert_settles(*wrong(theory, 1.1e-3), P, case=case, rtol=1e-3)
     with pytest.raises(AssertionError, match=r"does not settle in SS: .*; it settles in NS"):
         assert_settles(np.linspace(0, 60, 500), np.full(500, 25.0), P, rtol=1e-3)
-    steel = Parameters.named("steel-in-water").replace(
-        omega_0=23.0
-    )  # 30 s are enough, as slip lets drag grow
+    # 30 s are enough, as slip lets drag grow
+    steel = Parameters.named("steel-in-water").replace(omega_0=23.0)
     run = analytic.simulate(steel, [0.0] * 6, 30.0)
     assert_settles(run.time, run.omega_c, steel, case="SS", rtol=1e-3)
 

@@ -481,9 +481,8 @@ def test_bisection_closes_in_on_the_change_unless_runs_are_undecided_or_break_do
     # An end that was taken for granted is asked: it has a run if it was right.
     assert narrowed(lambda run: run[0] < 0.95, 0.5, careful=False).runs[1] == (1.0, USUAL)
     assert narrowed(lambda run: True, 0.5, careful=False).runs[1] is None
-    moves = narrowed(
-        lambda run: run[0] < (0.31 if run[1] is FINER else 0.3), 1e-4
-    )  # with the time step
+    # with the time step
+    moves = narrowed(lambda run: run[0] < (0.31 if run[1] is FINER else 0.3), 1e-4)
     assert moves.low < 0.3 < moves.high
     assert moves.place.uncertainty >= uniform(moves.shift) > 0
 

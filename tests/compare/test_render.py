@@ -71,9 +71,8 @@ def test_a_ball_that_rolls_turns_about_its_contacts():
     turned = (seen.turns[1:] * seen.turns[:-1].inv()).as_matrix()
     arms = np.einsum("nab,cnb->cna", turned, (seen.contacts - seen.centres)[:, :-1])
     moved = seen.centres[1:] + arms - seen.contacts[:, :-1]
-    assert (
-        np.abs(moved).max() < 0.1 * np.abs(np.diff(seen.centres, axis=0)).max()
-    )  # to the second order of the step
+    # to the second order of the step
+    assert np.abs(moved).max() < 0.1 * np.abs(np.diff(seen.centres, axis=0)).max()
 
 
 def test_a_long_run_turns_part_by_part_and_says_how_far_it_is(run, monkeypatch):

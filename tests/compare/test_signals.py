@@ -96,13 +96,8 @@ def test_every_command_ends_at_any_moment(stocked, tmp_path, command, number, af
         assert process.returncode == 128 + number, err
         (said,) = (line for line in err.splitlines() if line.startswith("dualball"))
         assert "interrupted" in said or "was stopped at t =" in said
-        if out and command not in (
-            "simulate",
-            "validate",
-            "figures",
-            "judge",
-            "explore",
-        ):  # then it had just been done
+        # then it had just been done
+        if out and command not in ("simulate", "validate", "figures", "judge", "explore"):
             assert out.rstrip() == started(*line, cwd=here).communicate()[0].rstrip()
     new = set(here.rglob("*")) - before
     assert not [

@@ -55,12 +55,8 @@ def test_the_ladder_ends_at_the_defaults_by_one_thing_at_a_time():
     _, *rungs, law = settings.rungs(1e-3).values()  # the first one is an engine of its own
     assert law == RigidContacts()
     assert rungs[-1] == ContactSettings()
-    contact = {
-        "solref",
-        "solreffriction",
-        "solimp",
-        "impratio",
-    }  # one thing: what makes it stiff and continuous
+    # one thing: what makes it stiff and continuous
+    contact = {"solref", "solreffriction", "solimp", "impratio"}
     for low, high in itertools.pairwise(rungs):
         changed = {
             f.name for f in dataclasses.fields(low) if getattr(low, f.name) != getattr(high, f.name)

@@ -101,10 +101,8 @@ def test_breaks_away_at_the_limit(rigid):
 def test_what_slides_keeps_its_contacts(rigid, geom, step):
     """Down a slope with g (sin - mu cos), to 1e-9, and never without contact; where it begins, it
     settles for 2 s."""
-    slope, mu = (
-        np.radians(20),
-        0.05 if geom == BALL else 0.25,
-    )  # a ball slides as long as mu < 2/7 tan
+    # a ball slides as long as mu < 2/7 tan
+    slope, mu = np.radians(20), 0.05 if geom == BALL else 0.25
     model, data = scene(slope, mu, geom=geom, option=f'timestep="{step}" tolerance="1e-12"')
     law, speeds, loads = Coulomb(model, rigid=rigid), [], []
     law.step(data, round(2 / step))

@@ -16,9 +16,8 @@ def both(run):
 def assert_no_worse(plain, soft):
     """Nothing went wrong, nothing sinks in deeper, energy rises no higher."""
     assert not soft.wrong
-    assert (
-        soft.depth <= 1.3 * plain.depth
-    )  # what slides is lifted out of its depth in plain MuJoCo alone
+    # what slides is lifted out of its depth in plain MuJoCo alone
+    assert soft.depth <= 1.3 * plain.depth
     if plain.rise is not None:
         assert soft.rise <= WORSE * plain.rise + 1e-3
 
