@@ -296,11 +296,9 @@ def assert_settles(
         raise InputError(f"there is no case {case!r}; there are {', '.join(Case.__members__)}")
     lasting = analytic.stable_solutions(p, sinking=True) if p.c else []
     stays = [s for s in lasting if not s.moves]
-    states = (
-        stays
-        if case is None
-        else [analytic.solution(p, Case[case] if isinstance(case, str) else case)]
-    )
+    states = stays
+    if case is not None:
+        states = [analytic.solution(p, Case[case] if isinstance(case, str) else case)]
     if not states or not p.c:
         raise InputError(
             f"at c = {p.c:g} s-1, omega_0 = {p.omega_0:g} rad s-1 there is no state to settle in"

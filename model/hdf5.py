@@ -207,11 +207,8 @@ def write_columns(
     dimensions of the others."""
     written: dict[str, h5py.Dataset] = {}
     for name, values in columns.items():
-        text = (
-            h5py.string_dtype()
-            if np.size(values) and isinstance(np.ravel(values)[0], str)
-            else None
-        )
+        is_text = np.size(values) and isinstance(np.ravel(values)[0], str)
+        text = h5py.string_dtype() if is_text else None
         written[name] = file.create_dataset(
             name, data=np.asarray(values, object) if text else values, dtype=text
         )

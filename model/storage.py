@@ -46,6 +46,7 @@ BATCH, BATCH_VERSION = "dualball-batch", 1
 """What a file of many runs says of itself."""
 _CASE_ENUM = h5py.enum_dtype({case.name: case.value for case in Case}, basetype=np.int8)
 _TEXT = h5py.string_dtype()
+_PACKED = {"compression": "gzip", "shuffle": True}
 
 
 def save(trajectory: Trajectory, path: str | Path) -> None:
@@ -79,15 +80,7 @@ class TrajectoryWriter(WholeFile):
                         "maxshape": (None, *shape),
                         "chunks": (1024, *shape),
                     }
-                    _create_column(
-                        self.file,
-                        meta,
-                        (time, "axis"),
-                        scales,
-                        **sizes,
-                        compression="gzip",
-                        shuffle=True,
-                    )
+                    _create_column(self.file, meta, (time, "axis"), scales, **sizes, **_PACKED)
             begun.pop_all()
 
     def append(self, samples: npt.NDArray[np.void]) -> None:
@@ -146,14 +139,9 @@ def save_batch(runs: Mapping[str, Trajectory], path: str | Path) -> None:
                 values = np.full((len(runs), max(counts), *meta["shape"]), empty, meta["dtype"])
                 for row, count, table in zip(values, counts, tables, strict=True):
                     row[:count] = getattr(table, name)
-                packed = (
-                    {"compression": "gzip", "compression_opts": 1, "shuffle": True}
-                    if values.size
-                    else {}
-                )
-                _create_column(
-                    file, meta, ("run", dimension, "axis"), scales, data=values, **packed
-                )
+                sizes = {"compression_opts": 1, **_PACKED} if values.size else {}
+                names = ("run", dimension, "axis")
+                _create_column(file, meta, names, scales, data=values, **sizes)
         whole.finish()
 
 

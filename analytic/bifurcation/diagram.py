@@ -142,11 +142,10 @@ def double_points(p: Parameters, equal: bool = False) -> list[DoublePoint]:
     light = slipping_branch.light_drag(p)
     eta_cr = float(np.cbrt(light**2 / 4) if equal else slipping_branch.eta_critical(p.mu, p))
     folds = 0 < eta_cr < p.j
-    points = (
-        [DoublePoint(eta_cr, float(unit / np.sqrt(eta_cr)), ("omega_02", "omega_04"))]
-        if folds
-        else []
-    )
+    points = []
+    if folds:
+        born = ("omega_02", "omega_04")
+        points.append(DoublePoint(eta_cr, float(unit / np.sqrt(eta_cr)), born))
     if equal or p.mu > 0:
         meets = ("omega_01", "omega_02", "omega_03", *("omega_04",) * folds)
         points.append(DoublePoint(p.j, float(unit / np.sqrt(p.j)), meets))

@@ -170,11 +170,9 @@ def _share_met(need: Impulse, friction: Friction) -> Impulse:
     if friction.s != 0 or friction.t != 0:
         return Impulse(0.0, -friction.s, -friction.t)
     size, limit = math.sqrt(need.s * need.s + need.t * need.t), friction.coefficient * need.n
-    return (
-        Impulse(limit / size, need.s / size, need.t / size)
-        if size > limit
-        else Impulse(1.0, 0.0, 0.0)
-    )
+    if size <= limit:
+        return Impulse(1.0, 0.0, 0.0)
+    return Impulse(limit / size, need.s / size, need.t / size)
 
 
 def _project_rate(held: Impulse, friction: Friction, by: Impulse) -> Impulse:

@@ -320,11 +320,9 @@ def defect_jacobian(loop: Loop, derivative: Array, varied: str | None) -> Array:
     """Derivative (d - 1, d - 1) of the gap by which a loop isn't closed; one more column if a
     parameter is varied."""
     by_state = derivative - np.eye(len(derivative))
-    return (
-        np.column_stack([by_state, loop.slope(np.eye(len(loop.free) + 1)[-1], varied)])
-        if varied
-        else by_state
-    )
+    if not varied:
+        return by_state
+    return np.column_stack([by_state, loop.slope(np.eye(len(loop.free) + 1)[-1], varied)])
 
 
 def extent(run: Trajectory) -> float:

@@ -71,12 +71,10 @@ class Dart(Free):
             for at in body.parts:
                 if body.shape == "disc":
                     shape = bodies.CylinderShape(size[0], 2 * size[1])
+                elif body.shape == "box":
+                    shape = bodies.BoxShape(2 * size)
                 else:
-                    shape = (
-                        bodies.BoxShape(2 * size)
-                        if body.shape == "box"
-                        else bodies.SphereShape(size[0])
-                    )
+                    shape = bodies.SphereShape(size[0])
                 self.add(skeleton, node, shape, friction, at)
             self.nodes.append(node)
 

@@ -88,12 +88,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"dualball: error: {': '.join(said)}", file=sys.stderr)
         return 2
     except KeyboardInterrupt as error:
-        there = args.resumes and args.output.is_dir()
-        kept = (
-            f"; what is done is kept in {args.output}, the same command goes on from there"
-            if there
-            else ""
-        )
+        kept = ""
+        if args.resumes and args.output.is_dir():
+            kept = f"; what is done is kept in {args.output}, the same command goes on from there"
         print(f"dualball: interrupted{kept}", file=sys.stderr)
         return error.code if isinstance(error, signals.Interrupted) else 130
 

@@ -153,11 +153,8 @@ class Check:
     @property
     def required_resolution(self) -> float:
         """The largest relative error of a prediction that it may overlook."""
-        return (
-            quantity(self.measurement.quantity).resolution
-            if self.required is None
-            else self.required
-        )
+        usual = quantity(self.measurement.quantity).resolution
+        return usual if self.required is None else self.required
 
 
 @dataclass(frozen=True)

@@ -274,11 +274,8 @@ def coarse_and_missing(ran: Sequence[Verdict]) -> str:
     left_out = sum(each.rows for each in {each for verdict in ran for each in verdict.missing})
     parts = [f"{coarse} of these numbers are too coarse to tell"] * (coarse > 0)
     parts += [f"{left_out} more could not be measured"] * (left_out > 0)
-    return (
-        f"{' and '.join(parts)}: an error of theory there alone would go unnoticed."
-        if parts
-        else ""
-    )
+    alone = ": an error of theory there alone would go unnoticed."
+    return " and ".join(parts) + alone if parts else ""
 
 
 def totals(ran: Sequence[Verdict]) -> list[tuple[str, str]]:

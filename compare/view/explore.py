@@ -136,13 +136,8 @@ def characteristic(p: Parameters, start: float, fastest: float) -> Figure:
     shown = [
         (name, at) for name, at in guides if at < fastest and not (name == "omega_03" and folds)
     ]
-    guide = {
-        "type": "line",
-        "yref": "paper",
-        "y0": 0,
-        "y1": 1,
-        "line": {"color": "#999", "dash": "dot"},
-    }
+    dotted = {"color": "#999", "dash": "dot"}
+    guide = {"type": "line", "yref": "paper", "y0": 0, "y1": 1, "line": dotted}
     shapes = [guide | {"x0": at, "x1": at} for _, at in shown]
     label = {
         "yref": "paper",
@@ -283,11 +278,8 @@ def serve(p: Parameters, port: int, show: bool) -> None:
         try:
             tried.bind((HOST, port))
         except OSError as error:
-            why = (
-                "is in use"
-                if error.errno == errno.EADDRINUSE
-                else f"can't be had: {error.strerror}"
-            )
+            used = error.errno == errno.EADDRINUSE
+            why = "is in use" if used else f"can't be had: {error.strerror}"
             raise InputError(f"port {port} {why}; choose another one by --port") from error
     scene = motion.write(p, 1.0)
     app.add_route("/motion", lambda _: HTMLResponse(scene))
