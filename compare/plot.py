@@ -37,15 +37,12 @@ if TYPE_CHECKING:
     import xarray
 
 
-def characteristic(
-    p: Parameters, axes: Axes | None = None, *, fastest: float | None = None
-) -> Axes:
-    """The stationary solutions of a set, omega_c over omega_0 up to the fastest, rad/s: dashed
-    where unstable.
+def characteristic(p: Parameters, axes: Axes | None = None) -> Axes:
+    """The stationary solutions of a set, omega_c over omega_0: dashed where unstable.
 
     Dotted: the thresholds (84) to (88). The title warns of a fluid for which the model doesn't
     hold. Raises `InputError` where a set has none, as without drag."""
-    axes, top = _given_or_new(axes), fastest or flowmeter.top_flow(p)
+    axes, top = _given_or_new(axes), flowmeter.top_flow(p)
     flowmeter.theory(axes, p, top)
     axes.set(xlabel=style.OMEGA_0, ylabel=style.OMEGA_C)
     _warn(axes, p, p.replace(omega_0=top))

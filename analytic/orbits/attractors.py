@@ -118,11 +118,8 @@ class Attractor:
         return self.limit.orbit.cycle if self.limit.orbit else self.limit.last
 
 
-def event_driven(
-    p: Parameters, x0s: Array, duration: float, interval: float, threads: int | None = None
-) -> list[Trajectory]:
-    """Event-driven simulations from states x0s (n, 8), in as many threads as are asked for, or
-    cores; see `Runs`."""
+def event_driven(p: Parameters, x0s: Array, duration: float, interval: float) -> list[Trajectory]:
+    """Event-driven simulations from states x0s (n, 8), in as many threads as cores; see `Runs`."""
 
     def motion(x0: Array) -> Trajectory:
         try:
@@ -131,7 +128,7 @@ def event_driven(
             run: Trajectory = error.trajectory
             return run
 
-    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
         return list(pool.map(motion, x0s))
 
 

@@ -121,9 +121,9 @@ def top(values: Array, k: npt.NDArray[np.intp], late: Array) -> Array:
     return np.asarray(values[k] + late * (values[k + 1] - values[k - 1]) / 4)
 
 
-def hops(run: Trajectory, share: float = 1 / 3) -> bool:
-    """Whether a ball hops on in the last part of a run, see `hops_on`."""
-    return hops_on(run.y[tail(run, share)], run.header.parameters.R)
+def hops(run: Trajectory) -> bool:
+    """Whether a ball hops on in the last third of a run, see `hops_on`."""
+    return hops_on(run.y[tail(run, 1 / 3)], run.header.parameters.R)
 
 
 def hops_on(y: Array, R: float) -> bool:
