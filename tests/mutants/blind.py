@@ -45,8 +45,8 @@ from tests.mutants.exchange import WrongTheory, believed
 from tests.mutants.trial import PATIENCE, PROVING
 
 PAGE, KEY = Path("docs/blind.md"), "key.json"
-ASKED = ("drake",)
-"""Engines beside MuJoCo that measure where they are installed."""
+ASKED = ("drake", "siconos")
+"""Engines beside MuJoCo that measure where they are installed; the page says which aren't."""
 Sets = Mapping[str, Parameters]
 
 
@@ -221,6 +221,7 @@ def section(
         notes += ["breaks down"] * detection.broke
         shown = "`" + what.replace("|", "\\|") + "`"
         faults.append([shown, *(detection.by.get(name, "–") for name in names), ", ".join(notes)])
+    absent = ", ".join(name for name in ASKED if name not in names)
     live = sum(each.changes for each in detections)
     found = sum(bool(each.by) for each in detections)
     where = "; ".join(
@@ -233,6 +234,7 @@ def section(
 Found: **{found} of the {live} faults that change a prediction or a measurement**, of {len(key)}
 that were planted. Rules as
 of the commit `{current_commit()[:12] or "unknown"}`. Sets, SI: `{where}`.
+Measured by {", ".join(names)}; not installed: {absent or "none"}.
 
 {pages.markdown(counts)}
 

@@ -16,6 +16,7 @@ import pytest
 
 import analytic
 from analytic.stationary import solutions as stationary
+from compare.adapters.free import Library
 from compare.claim import Outcome
 from compare.kit.campaign import Campaign
 from compare.kit.engines import ENGINES, MUJOCO
@@ -115,14 +116,23 @@ def test_what_no_measurement_shows_a_unit_test_sees(wrong, tmp_path):
     assert "1 failed" in done.stdout, done.stdout
 
 
-def test_a_round_is_played_by_a_seed(tmp_path):
-    """One set, one protocol, and faults in what its claims call; the key is kept beside it."""
+def test_a_round_is_played_by_a_seed(tmp_path, monkeypatch):
+    """One set, one protocol, and faults in what its claims call; the key is kept beside it. Of the
+    engines that are asked beside MuJoCo one is there, and the page says so."""
+    there = dataclasses.replace(MUJOCO, name="siconos", divisors=(1, 2, 4))
+    absent = dataclasses.replace(
+        ENGINES["drake"], needs=Library("no-such-library", "compare.adapters.drake")
+    )
+    monkeypatch.setitem(ENGINES, "siconos", there)
+    monkeypatch.setitem(ENGINES, "drake", absent)
     plan = blind.Plan(sets=1, theories=3, engines=0, protocols=("field",), by=(MUJOCO,))
     said = blind.play(1, tmp_path, plan)
     key = json.loads((tmp_path / blind.KEY).read_text("utf-8"))
     assert len(key) == 3
     assert all(f"| `{what}` | " in said for what in key)
     assert "| mujoco | " in said
+    assert "| siconos | " in said
+    assert "Measured by mujoco, siconos; not installed: drake." in said
     assert " | none | " in said  # false alarms
 
 
