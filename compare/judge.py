@@ -56,8 +56,12 @@ def simulated(
 
 
 def integrated(value: float, size: float, rtol: float = RTOL) -> Estimate:
-    """A number of a simulated motion, of this size: errors of 100 steps may have the same sign."""
-    return Estimate(value, 100 * rtol * abs(size))
+    """A number of a simulated motion, of this size.
+
+    Of 395 numbers of 76 motions, simulated with `RTOL` and with 1e-11, none differs by more than a
+    quarter of `RTOL`. Three times as much may be off elsewhere. (It was 100 times the tolerance, a
+    bound.)"""
+    return Estimate(value, rtol * abs(size))
 
 
 def judge(claims: Iterable[Claim], records: Records) -> list[Verdict]:

@@ -68,6 +68,9 @@ class Engine:
     """Whether it takes `Parameters.fluid_torque`."""
     lands_within: float = 1.0
     """Part of a time step within which it finds when a contact closes."""
+    lag: float = 3.0
+    """Time steps by which a contact force lags behind its load: of a ball set on floor and wall
+    MuJoCo's own contacts find it in the fourth step."""
     needs: Library | None = None
     """An optional library that it needs; the version of that is one of `versions`."""
     title: str = ""
@@ -198,6 +201,7 @@ MUJOCO = Engine(
     stands_on=("numpy", "mujoco"),
     torque=True,
     lands_within=1 / LANDING_PARTS,
+    lag=1.0,  # rigid contacts find it in the first step
     title="MuJoCo under Coulomb's law",
     about="rigid contacts by mjsim.Coulomb, which any model can have; two time steps, of at most 4 "
     "and 2 ms",
@@ -210,6 +214,7 @@ PLAIN = replace(
     configure=lambda given, p: plain(given.get("timestep", ContactSettings.timestep)).suited(p),
     stream=_unwarned,
     lands_within=1.0,
+    lag=3.0,
     title="MuJoCo without Coulomb's law",
     about="the same scene with MuJoCo's own contacts, well set, as time steps tend to zero",
     role=Role.IN_THE_LIMIT,

@@ -129,47 +129,57 @@ def of_three_steps(values: Array) -> tuple[Array, Array]:
     """Limits (n,) of a vanishing step of values (3, n) with a step, half of it, and a quarter,
     in two ways, each (n,).
 
-    The first is free of errors of first and second order; the second is by the order that each
-    number shows, no less than the first. Where one power of the step is all there is, whichever,
-    the second is right; where the first two are, the first. The difference is the first's standard
-    uncertainty. (As a bound, uniformly distributed, it was too little: on 17 sets 8 of 4527 numbers
-    were off by more than three uncertainties.)"""
+    The first is free of errors of first and second order. The second is by the order that each
+    number shows, no less than the first, or by second order alone, whichever is farther from the
+    first. Where one power of the step is all there is, the order that shows is right; where the
+    first two are, the first way. The difference bounds the first's error, which may be anything up
+    to it: a uniform distribution. (Second order alone was added, and the difference read as a bound
+    in place of a standard uncertainty, after an error of 5 uncertainties had been seen. It fell as
+    if by first order between the longer steps and faster then, so that two ways agreed by chance.)
+    """
     before, last = np.diff(values, axis=0)
     ratios = np.divide(last, before, out=np.zeros_like(last), where=before != 0)
     ratios = np.clip(ratios, 0.0, 0.5)
     limits = values[2] + (5 * last - before) / 3
-    return limits, values[2] + last * ratios / (1 - ratios)
+    ways = values[2] + last * np.stack([ratios / (1 - ratios), np.full_like(last, 1 / 3)])
+    farther = np.argmax(np.abs(ways - limits), axis=0)
+    return limits, np.take_along_axis(ways, farther[None], axis=0)[0]
 
 
-def unlike(changes: Array) -> Array:
-    """Changes (n,) as uncertainties go by them: each by its own size, and by a quarter of the
+SURER = 1 / 8
+"""The share in `unlike` of changes that three ways show, which seldom agree by chance. (Chosen with
+results in sight: of 2596 numbers of quick none is then off by more than 2.2 uncertainties.)"""
+
+
+def unlike(changes: Array, share: float = 1 / 4) -> Array:
+    """Changes (n, ...) as uncertainties go by them: each by its own size, and by a share of the
     largest.
 
     A change is a sum of parts of first order and of what is left of the start. Where they cancel by
     chance it is little, but what is left of them once the step is extrapolated isn't; and equations
     couple the numbers, so that their parts are of like size. (A quarter was chosen after results
-    had been seen: with a tenth 3 of 2104 numbers were off by more than three uncertainties.)"""
+    had been seen: with a tenth 3 of 2104 numbers were off by more than three uncertainties. That
+    was before `of_three_steps` looked three ways, see `SURER`.)"""
     sizes = np.abs(changes)
-    return np.asarray(np.hypot(sizes, sizes.max(initial=0.0) / 4))
+    return np.asarray(np.hypot(sizes, share * sizes.max(initial=0.0)))
 
 
 STEP_RATIO = 16
 """Steps in one of `coarse_step`; the finer run has twice as many. With shorter ones the studies'
 settings come to the engine's least impedance, and contacts then answer no faster."""
-LAG = 3
-"""Steps by which a contact force lags behind its load."""
 HALF_WINDOW, WINDOW_DEGREES = 8, (5, 3)
 """Half the width of a window in the middle of a motion, in steps of the coarser run; degrees of the
 polynomials through it, of which the lower one shows what the degree changes."""
 
 
-def lag_error(p: Parameters, divisor: int = 1) -> float:
+def lag_error(runner: Runner, p: Parameters, divisor: int = 1) -> float:
     """Standard uncertainty of a force divided by the weight, where halving the step may by chance
     change nothing.
 
-    The error is at most half the square of the lag `LAG` in units of `time_unit`: the second order,
+    The error is at most half the square of `Engine.lag` in units of `time_unit`: the second order,
     once the first is extrapolated. The steps of `STEP_RATIO` may be divided by `divisor`."""
-    return uniform((LAG * coarse_step(p) / (STEP_RATIO * divisor) / time_unit(p)) ** 2 / 2)
+    lag = runner.engine.lag * coarse_step(p) / (STEP_RATIO * divisor)
+    return uniform((lag / time_unit(p)) ** 2 / 2)
 
 
 def polynomials(

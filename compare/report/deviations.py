@@ -16,6 +16,11 @@ from compare.kit.quantities import QUANTITIES
 from compare.kit.record import Check, Relation
 from compare.kit.statistics import COVERAGE
 
+SOLVERS = frozenset({"solver", "solver_at_random", "rounding"})
+"""Causes of which one accuracy is known for all numbers. What is left of them is spread over many
+powers of ten, so that most of the numbers that they limit are nearer to theory than that."""
+LIMITED, OTHERS = "limited by solvers and round-off", "limited by what changes show"
+
 
 @dataclass(frozen=True)
 class Deviations:
@@ -23,7 +28,7 @@ class Deviations:
 
     engine: str
     quantity: str
-    """Its symbol; empty for all quantities."""
+    """Its symbol, or what limits quantities; empty for all."""
     sizes: Sequence[float]
 
     @property
@@ -36,8 +41,19 @@ class Deviations:
         return sum(size > uncertainties for size in self.sizes) / len(self.sizes)
 
 
-def sizes(checks: Iterable[Check]) -> dict[str, list[float]]:
-    """Sizes of deviations in standard uncertainties, by quantity; each number once.
+@dataclass(frozen=True)
+class Deviation:
+    """How far a number is from theory."""
+
+    quantity: str
+    limit: str
+    """What makes up most of its uncertainty: `LIMITED` or `OTHERS`."""
+    size: float
+    """In standard uncertainties."""
+
+
+def deviations(checks: Iterable[Check]) -> list[Deviation]:
+    """Those of checks, each number once.
 
     Of what has an uncertainty and a prediction; what only bounds is left out."""
     found = {}
@@ -46,29 +62,28 @@ def sizes(checks: Iterable[Check]) -> dict[str, list[float]]:
         size = COVERAGE * check.share
         if check.tolerance and check.relation is Relation.EQUAL and math.isfinite(size):
             where = m.protocol, m.set, m.parameters.omega_0, tuple(sorted(m.at.items()))
-            found[m.quantity, m.value, where] = size
-    by_quantity: dict[str, list[float]] = {}
-    for (name, *_), size in found.items():
-        by_quantity.setdefault(name, []).append(size)
-    return by_quantity
+            most = max(m.budget, key=m.budget.__getitem__, default="")
+            limit = LIMITED if most in SOLVERS else OTHERS
+            found[m.quantity, m.value, where] = Deviation(m.quantity, limit, size)
+    return list(found.values())
 
 
 def distribution(ran: Sequence[Verdict]) -> list[Deviations]:
-    """For each engine: of all its numbers, then of each quantity."""
+    """For each engine: of all its numbers, by what limits them, and of each quantity."""
     rows = []
     for engine in dict.fromkeys(each.engine for verdict in ran for each in verdict.engines):
-        own = sizes(
+        own = deviations(
             check
             for verdict in ran
             for each in verdict.engines
             if each.engine == engine
             for check in each.checks
         )
-        if own:
-            rows.append(Deviations(engine, "", [size for those in own.values() for size in those]))
-            rows += [
-                Deviations(engine, known.symbol, own[name])
-                for name, known in QUANTITIES.items()
-                if name in own
-            ]
+        kinds = [("", own)]
+        kinds += [(name, [d for d in own if d.limit == name]) for name in (LIMITED, OTHERS)]
+        kinds += [
+            (known.symbol, [d for d in own if d.quantity == name])
+            for name, known in QUANTITIES.items()
+        ]
+        rows += [Deviations(engine, name, [d.size for d in of]) for name, of in kinds if of]
     return rows

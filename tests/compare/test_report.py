@@ -466,13 +466,17 @@ def test_the_league_page_answers(browser, tab, tmp_path, capsys):
 
 
 def test_deviations_are_told_in_uncertainties_by_engine_and_quantity_each_number_once():
-    own = checks(4, 4.4e-9)
+    first, *others = checks(4, 4.4e-9)
+    by_solver = dataclasses.replace(first.measurement, budget={"drift": 1e-9, "solver": 2e-9})
+    own = (dataclasses.replace(first, measurement=by_solver), *others)
     said = EngineVerdict(engine="mujoco", outcome=Outcome.REFUTED, checks=own)
     twice = [
         Verdict(claim=claim(name), outcome=Outcome.REFUTED, checks=own, engines=(said,))
         for name in ("one", "two")
     ]
-    whole, of_orbits = deviations.distribution(twice)
+    whole, solved, shown, of_orbits = deviations.distribution(twice)
     assert (whole.engine, whole.quantity, of_orbits.quantity) == ("mujoco", "", "ω_c")
     assert whole.sizes == of_orbits.sizes == pytest.approx([1.1, 2.2, 3.3, 4.4], rel=1e-5)
+    assert (solved.quantity, solved.sizes) == (deviations.LIMITED, whole.sizes[:1])
+    assert (shown.quantity, shown.sizes) == (deviations.OTHERS, whole.sizes[1:])
     assert [whole.beyond(n) for n in (1, 2, 3)] == [1.0, 0.75, 0.5]

@@ -125,9 +125,10 @@ def _motion_either(m: Measurement) -> Trajectory:
     return stays if stays.case[-1] == case else leaves
 
 
-def _end_in_case(m: Measurement) -> float:
+def _end_in_case(m: Measurement) -> Estimate:
     """A variable of theory's motion at its end, by the name of the measured one."""
-    return float(getattr(_motion_either(m), m.of)[-1])
+    value = float(getattr(_motion_either(m), m.of)[-1])
+    return integrated(value, quantity(m.quantity).size(m.parameters))
 
 
 LAW_CLAIMS = (

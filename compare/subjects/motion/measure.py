@@ -49,6 +49,7 @@ from compare.kit.statistics import Estimate, estimate, uniform
 from compare.kit.step_pairs import (
     HALF_WINDOW,
     STEP_RATIO,
+    SURER,
     Start,
     StepPair,
     StepPairResult,
@@ -328,7 +329,7 @@ def _values(
         for name in held[0]
     }
     best, other, lower = np.transpose([of / size for of, size in read_off.values()])
-    steps, degrees = unlike(best - other), unlike(best - lower)
+    steps, degrees = unlike(best - other, SURER), unlike(best - lower, SURER)
     # A contact that rolls is held by friction of a moment ago: its slip should not change at all,
     # and what it changes comes from the rates of other variables.
     slips = [k for k in range(8)[SLIP_XYZ] if VARIABLES[k] in TRAITS[case].constraints]
@@ -337,8 +338,8 @@ def _values(
     for k, (name, (of, size)) in enumerate(read_off.items()):
         causes = {"rolling": uniform(rolling)} if name.startswith("rate") else {}
         causes |= {
-            "time_step": float(steps[k]),
-            "degree": float(degrees[k]),
+            "time_step": uniform(float(steps[k])),
+            "degree": uniform(float(degrees[k])),
             "solver": uniform(LOADS_FOUND),
         }
         values[name] = estimate(of[0], size, **causes)
@@ -439,9 +440,9 @@ def _turns_at_end(piece: StepPairResult) -> Measured:
         yield piece.missing(why)
         return
     late = closing_error(piece.runner, pair.p) if closes(piece.fine) else 0.0
+    least = lag_error(piece.runner, pair.p, 2) if changes(piece.fine) else 0.0
     for name, value, unit, off in list(zip(VARIABLES, *_ends(piece), strict=True))[TURNING]:
-        # where a case changes, steps may by chance agree: forces lag behind
-        read = estimate(value, unit, time_step=max(off, lag_error(pair.p)), closing=late)
+        read = estimate(value, unit, time_step=max(off, least), closing=late)
         yield piece.row(f"end_{name}", read)
 
 
@@ -450,7 +451,13 @@ def _ends(piece: StepPairResult) -> tuple[list[float], ...]:
     how far off the limit may be, in that."""
     units = state_units(piece.pair.p)
     limits, others = of_three_steps(np.stack([run.x[-1] for run in piece.reads]) / units)
-    return (limits * units).tolist(), units.tolist(), unlike(limits - others).tolist()
+    off = [uniform(each) for each in unlike(limits - others, SURER).tolist()]
+    return (limits * units).tolist(), units.tolist(), off
+
+
+def changes(run: Trajectory) -> bool:
+    """Whether the case changes in a run: forces then lag behind, and steps may by chance agree."""
+    return bool(np.ptp(run.case))
 
 
 def closes(run: Trajectory) -> bool:
@@ -625,11 +632,11 @@ def whole_runs(runner: Runner, sets: Sets, records: Records) -> Measured:
         elif how == "rough floor" and fine.force_A[:, 1].mean() < PRESSES * p.m * p.g:
             yield run.missing(f"{how}: the contact force is so small that the ball may hover")
         else:
-            if apart := how in ("smooth wall", "rough floor"):
+            if apart := how in ("smooth wall", "rough floor"):  # next to a change of case
                 yield run.row("case", float(fine.case[-1]), time=time)
+            least = lag_error(run.runner, p) if apart or changes(fine) else 0.0
             for variable, value, size, off in zip(VARIABLES, *_ends(run), strict=True):
                 if variable == "omega_c" or not apart:
-                    least = lag_error(p) if apart else 0.0  # next to a change of case
                     row = estimate(value, size, time_step=max(off, least))
                     yield run.row(f"end_{variable}", row, time=time)
 

@@ -5,6 +5,11 @@ runs, divided by the size of the push, is a column of D(t), which a linear motio
 some time later: the logarithms of the eigenvalues of P are the exponents. Two sizes of the push are
 extrapolated to zero, and so are two time steps.
 
+Under another law of drag than Stokes' the rate of a ball without lag is that of the lag which the
+push makes. With w = 1.6e-6 m/s, Re = 4e-4, drag by Schiller and Naumann is 7e-4 greater than by
+Stokes; so these pushes are extrapolated to zero, too. (Until that was understood such states had an
+uncertainty of up to 4e-2.)
+
 Two states are special. A ball that spins in a fluid at rest (RS) feels the wall only by a friction
 of the order of omega_c^2: it takes a large push. Where floor and ball only just touch (SR), every
 push makes the ball lean on the floor one way and lifts it off the other way: only the first is
@@ -40,7 +45,7 @@ from compare.kit.statistics import (
     propagator_error,
     uniform,
 )
-from compare.kit.step_pairs import Start
+from compare.kit.step_pairs import Start, unlike
 from compare.kit.tasks import Task
 from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
@@ -76,8 +81,8 @@ def measure(runner: Runner, sets: Sets, records: Records) -> Measured:
     found = [each for name, p in sets.items() for each in chosen_states(runner, records, name, p)]
     yield from (each for each in found if isinstance(each, Missing))
     pushed = [each for each in found if isinstance(each, Pushed)]
-    yield from (each.missing(NOT_LINEAR, rows=each.numbers) for each in pushed if each.bent)
-    states = [each for each in pushed if not each.bent]
+    yield from (each.missing(NOT_LINEAR, rows=each.numbers) for each in pushed if each.too_hard)
+    states = [each for each in pushed if not each.too_hard]
     tasks = [state.tasks() for state in states]
     for state, own, runs in zip(states, tasks, runner.groups(tasks), strict=True):
         if isinstance(runs, str):
@@ -125,26 +130,31 @@ class Pushed:
         return (2, 16) if self.case is Case.RS else PUSH_RECORD
 
     @property
+    def bends(self) -> bool:
+        """Whether drag answers a slight lag by a broken power of it."""
+        return self.start.p.drag != STOKES
+
+    @property
     def order(self) -> int:
-        """The power of the push's size in its error: 2 where up and down are subtracted."""
-        return 1 if self.case is Case.SR else 2
+        """The power of the push's size in its error: 2 where up and down are subtracted, unless
+        drag `bends`."""
+        return 1 if self.case is Case.SR or self.bends else 2
 
     @property
     def sizes(self) -> tuple[float, ...]:
         """Sizes of the pushes: the first with the coarser step, then the largest first."""
-        size = PUSH.get(self.case, USUAL_PUSH if self.start.p.drag == STOKES else SLIGHT_PUSH)
-        return (size / 2, size, size / 2) if self.case in PUSH else (size / 2, size)
+        size = PUSH.get(self.case, SLIGHT_PUSH if self.bends else USUAL_PUSH)
+        extrapolated = self.case in PUSH or self.bends
+        return (size / 2, size, size / 2) if extrapolated else (size / 2, size)
 
     def solver_error(self, record: Array, lag: int) -> float:
         """Standard uncertainty of a response `lag` samples later, from the accuracy of forces.
 
         What no motion explains of the record; at most an error of one sign and of all that the law
-        may be off, more where slip is fast. Under other laws of drag than Stokes' always that: why
-        a rolling ball's decay is then off by 3e-4 isn't known, and no record shows it."""
+        may be off, more where slip is fast."""
         slip = np.abs(self.start.x0 / state_units(self.start.p))[SLIP_XYZ].max()
         most = uniform(SOLVED * max(1.0, float(slip)) / max(self.sizes) * lag)
-        seen = propagator_error(record, lag) if self.start.p.drag == STOKES else most
-        return min(seen, most)
+        return min(propagator_error(record, lag), most)
 
     @property
     def steps(self) -> tuple[float, float]:
@@ -155,9 +165,9 @@ class Pushed:
         return step / coarse, step / fine
 
     @property
-    def bent(self) -> bool:
+    def too_hard(self) -> bool:
         """Whether the push that the case asks for is too large for the drag: see `NOT_LINEAR`."""
-        return self.case in PUSH and self.start.p.drag != STOKES
+        return self.case in PUSH and self.bends
 
     @property
     def numbers(self) -> int:
@@ -317,7 +327,8 @@ def spectrum(state: Pushed, answers: Sequence[Array], step: float) -> Spectrum:
     correction = (plain - matched(exponents_of(coarse, coarse), plain)) / 3
     half = np.abs(values - matched(exponents_of(large, small, 0.5), values))
     bent, size = np.abs(values - plain), max(state.sizes)
-    bent *= np.clip(bent / np.maximum(np.abs(values), np.finfo(float).tiny), size**order, 1.0)
+    if not state.bends:  # the next order of the push is smaller by as much again
+        bent *= np.clip(bent / np.maximum(np.abs(values), np.finfo(float).tiny), size**order, 1.0)
     stepped = np.abs(values) * (np.abs(values).max() * step) ** 2 / 12
     budget = {
         "time_step": np.abs(correction),
@@ -369,7 +380,7 @@ def _responses(state: Pushed, answers: Sequence[Array], row: Row) -> Iterator[Me
 
     This shows the directions of the motions, not only their rates. It is extrapolated as `spectrum`
     does, to a vanishing push and step, and uncertain by what they change, by what two thirds of the
-    record say, and by the accuracy of the solver."""
+    record say, each see `unlike`, and by the accuracy of the solver."""
     names, length = TRAITS[state.case].active, min(map(len, answers))
     lasts, samples = state.record
     lag = length // 3
@@ -377,16 +388,17 @@ def _responses(state: Pushed, answers: Sequence[Array], row: Row) -> Iterator[Me
     shorter = propagator(answers[-1][: 2 * lag], lag)
     bent, late = (small - large) / (2**state.order - 1), (small - coarse) / 3
     value, time = small + bent + late, lag * lasts * coarse_step(state.start.p) / samples
-    budget = {
-        "push": uniform(float(np.abs(bent).max())),
-        "time_step": float(np.abs(late).max()),
-        "record": uniform(float(np.abs(small - shorter).max())),
-        "solver": state.solver_error(answers[-1][:length], lag),
-    }
+    solver = state.solver_error(answers[-1][:length], lag)
+    pushes, steps, records = unlike(bent), unlike(late), unlike(small - shorter)
     for (i, of), (j, by) in product(enumerate(names), repeat=2):
-        yield row(
-            quantity="response", value=estimate(value[i, j], **budget), time=time, of=of, pushed=by
+        sure = estimate(
+            value[i, j],
+            push=uniform(float(pushes[i, j])),
+            time_step=float(steps[i, j]),
+            record=uniform(float(records[i, j])),
+            solver=solver,
         )
+        yield row(quantity="response", value=sure, time=time, of=of, pushed=by)
 
 
 def natural_size(rate: float, other: float, p: Parameters) -> float:
