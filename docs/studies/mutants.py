@@ -63,14 +63,15 @@ def page(tried: Mapping[str, Sequence[Trial]], engines: Sequence[Trial] = ()) ->
     head = ["wrong", "tried", "noticed by numbers", "by an error", "by hanging", "missed"]
     return f"""# What the verdicts notice
 
-Every verdict must be able to be lost. So theory is replaced by slightly wrong ones, one at a time.
-The claims whose predictions call the wrong function judge the stored measurements again. Then
-MuJoCo is replaced by slightly wrong engines, which measure anew. A fault is noticed if the verdict
-on a claim changes. A prediction that takes {SLOWER:g} times as long as by the right theory, at
-most {PATIENCE:g} s of processor time, is given up, and its claim says nothing of the fault. Lists
-that others wrote say more than ours, which was written beside the claims: each of theirs was judged
-once, at quick, before anything was changed for it. Who notices which fault, and the unit test that
-sees what no measurement can show, is in [mutants.csv](mutants.csv). `make mutants` writes both.
+Every verdict must be able to be lost: theory is replaced by slightly wrong ones, one at a time, and
+MuJoCo by slightly wrong engines, which measure anew. A fault is noticed if the verdict on a claim
+changes; a prediction that takes {SLOWER:g} times as long as by the right theory, at most
+{PATIENCE:g} s, is given up. Lists that others wrote say more than ours, which was written beside
+the claims: each was judged once, at quick, before anything was changed for it. Who notices which
+fault, and the unit test that sees what no measurement can show, is in [mutants.csv](mutants.csv).
+`make mutants` writes all of it in two hours;
+`python -m tests.mutants results --page docs/mutants.md` takes two minutes and leaves out what is
+measured anew.
 
 {pages.markdown([head, *counts, *others])}
 """

@@ -18,6 +18,7 @@ from compare.judge import judge, select
 from compare.kit import levels, settling
 from compare.kit.brackets import FINER, LONGER, USUAL, Bracket, Search, narrow
 from compare.kit.conditions import state_of
+from compare.kit.engines import MUJOCO, PLAIN
 from compare.kit.levels import Level, sets
 from compare.kit.quantities import QUANTITIES
 from compare.kit.record import Missing, Records
@@ -34,12 +35,13 @@ from compare.kit.statistics import (
     uniform,
     zero_and_slope,
 )
-from compare.kit.step_pairs import of_no_step, of_three_steps, unlike
+from compare.kit.step_pairs import Start, lag_error, of_no_step, of_three_steps, unlike
 from compare.subjects.attractors import measure as attractors
 from compare.subjects.flowmeter import measure as flowmeter
 from compare.subjects.motion import measure as moving
 from compare.subjects.regions import measure as regions
 from compare.subjects.slipping import measure as slipping
+from compare.subjects.stability import measure as stability
 from compare.subjects.stationary import measure as settled
 from compare.subjects.thresholds import measure as thresholds
 from compare.subjects.unsteady import measure as unsteady
@@ -236,6 +238,30 @@ def test_what_changes_by_little_among_what_changes_by_much_is_not_sure():
         [math.hypot(4, 1) / 1e3, 1e-3, 1e-3]
     )
     assert unlike(np.zeros(0)).size == 0
+
+
+def test_a_decay_is_that_of_no_push_where_drag_bends():
+    """Of a ball that rolls with the fluid, whose drag by Schiller and Naumann a push increases."""
+    p = sets(Level.QUICK)["wake"]
+    state = stability.Pushed(None, Start("wake", p, "settled", np.zeros(8)), Case.RR)
+    lasts, samples = state.record
+    time = np.arange(1, samples) * lasts * coarse_step(p) / samples
+    decay = p.c / (1 + 2 * p.j)
+
+    def answer(size):
+        Re = 2 * p.r * p.R * size / time_unit(p) / p.nu_f
+        return np.exp(-decay * (1 + 0.15 * Re**0.687) * time)[:, None, None]
+
+    found = stability.spectrum(state, [answer(size) for size in state.sizes], coarse_step(p) / 16)
+    (rate,), (off,) = -found.exponents.real, found.uncertainty
+    assert 1e-4 * decay < abs(rate - decay) < 2 * off < 4e-4 * decay
+
+
+def test_forces_of_rigid_contacts_lag_less():
+    """By one step, not by three: the error goes with the square."""
+    p = Parameters.named("reference")
+    rigid, own = (lag_error(SimpleNamespace(engine=engine), p) for engine in (MUJOCO, PLAIN))
+    assert own == pytest.approx(9 * rigid)
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-9, 1e-6])

@@ -448,10 +448,13 @@ def _turns_at_end(piece: StepPairResult) -> Measured:
 
 def _ends(piece: StepPairResult) -> tuple[list[float], ...]:
     """Of each variable at the end of a motion: its limit of a vanishing step, its natural unit, and
-    how far off the limit may be, in that."""
+    its standard uncertainty, in that.
+
+    Errors of a long motion exceed what three steps change more often than those of a window: read
+    as a bound, 12 of 1587 numbers of six other sets were off by more than three uncertainties."""
     units = state_units(piece.pair.p)
     limits, others = of_three_steps(np.stack([run.x[-1] for run in piece.reads]) / units)
-    off = [uniform(each) for each in unlike(limits - others, SURER).tolist()]
+    off = unlike(limits - others, SURER).tolist()
     return (limits * units).tolist(), units.tolist(), off
 
 
