@@ -17,7 +17,7 @@ import re
 import sys
 import warnings
 from collections.abc import Sequence
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from typing import NoReturn
 
 from compare.commands import signals, waiting
@@ -91,7 +91,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         kept = ""
         if args.resumes and args.output.is_dir():
             kept = f"; what is done is kept in {args.output}, the same command goes on from there"
-        print(f"dualball: interrupted{kept}", file=sys.stderr)
+        with suppress(OSError):  # nobody reads it any more, as where what began this is gone
+            print(f"dualball: interrupted{kept}", file=sys.stderr)
         return error.code if isinstance(error, signals.Interrupted) else 130
 
 

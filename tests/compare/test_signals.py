@@ -2,6 +2,7 @@
 is half written."""
 
 import contextlib
+import io
 import os
 import shutil
 import signal
@@ -9,11 +10,12 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from unittest import mock
 
 import pytest
 
 import mjsim
-from compare.commands import signals, simulate
+from compare.commands import cli, signals, simulate
 from model import Parameters
 from tests.commands import COMMANDS, carried_out, started
 
@@ -172,6 +174,18 @@ def test_ctrl_c_ends_every_long_call() -> None:
     names = ("event", "time-stepping", "many", "mjsim", "mjsim soft", "mjsim many", "attractors")
     assert done.stdout.splitlines() == [f"{name} True" for name in names]
     assert "Traceback" not in done.stderr
+
+
+def test_an_orphan_whose_standard_error_nobody_reads_ends_as_any_other(monkeypatch, heard):
+    """Without an error of its own, after which it would wait for what its threads still do."""
+
+    class Unread(io.StringIO):
+        def write(self, text):
+            raise BrokenPipeError
+
+    monkeypatch.setattr(cli, "_run", mock.Mock(side_effect=signals.Interrupted(heard)))
+    monkeypatch.setattr(sys, "stderr", Unread())
+    assert cli.main([]) == 128 + heard
 
 
 def test_a_signal_that_python_loses_comes_again(heard):
