@@ -81,8 +81,10 @@ CORNER = 1.05 * math.pi
 """Angle without other points of its patch that a corner of the patch sees at least."""
 STEPS = 20
 """Factorisations that Newton's method may take for an island with one R."""
-EXACT, ROUGH = 1e-9, 3e-2
-"""Part of the forces without contacts to which it solves, and while contacts give way too much."""
+EXACT, ROUGH = 1e-9, 1e-6
+"""Part of the forces without contacts to which it solves with the least R, and with others. What is
+rougher changes how contacts share a load that they can bear in many ways: 3e-2 by half a per
+cent of a weight."""
 FEWER, DECREASE, SHORTEST = 0.5, 1e-4, 1e-3
 """By what a Newton step is shortened; by how much, relative to its length, the residual must fall;
 the shortest."""

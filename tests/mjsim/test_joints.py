@@ -7,6 +7,7 @@ import pytest
 
 import analytic
 import mjsim
+from analytic.slipping.slip_stability import lift_onset
 from mjsim.contact_settings import FORESEEN, YIELDS
 from mjsim.coulomb.parameters import Law
 from mjsim.stepping import SHARE
@@ -28,6 +29,18 @@ def test_a_settled_state_is_that_of_the_closed_form(case, omega_0, eta):
     # The depth that rigid contacts keep by default is a lever: RR would seem to slip by 1e-6 rad/s.
     for slip in ("slip_x", "slip_y", "slip_z"):
         assert getattr(run, slip)[-1] == pytest.approx(getattr(exact, slip), abs=3e-7)
+
+
+def test_floor_and_wall_share_the_weight_until_the_wall_alone_lifts_the_ball():
+    """In RR they can do so in many ways; rough solutions moved load to the floor."""
+    p = Parameters.named("high-wall-friction").replace(omega_0=20.0)
+    onset = lift_onset(Case.RR, Case.NR, State(omega_c=20.0), p)
+    squares, loads = np.array([0.98, 0.99]) * onset**2, []
+    for omega in np.sqrt(squares):
+        run = mjsim.simulate(p.replace(omega_0=omega), State(omega_c=omega), 4e-3)
+        loads.append(run.force_A[0, 1])
+    vanishes = squares[1] + loads[1] * (squares[1] - squares[0]) / (loads[0] - loads[1])
+    assert np.sqrt(vanishes) == pytest.approx(onset, rel=3e-5)
 
 
 def test_what_rolls_doesnt_slip_while_it_settles():
