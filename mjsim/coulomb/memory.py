@@ -157,8 +157,9 @@ MEMORY = np.dtype(
         *((f"{name}_at", _i8) for name in ("contact", "before", "row", "jacobian", "column")),
         *((f"{name}_at", _i8) for name in ("dry", "pose", "pair", "point", "xpos", "xmat", "body")),
         *((f"{name}_at", _i8) for name in ("restitution", "dof")),
-        *((f"{name}_at", _i8) for name in ("residual", "tried", "step", "matrix", "place")),
-        ("local_at", _i8),
+        # nv numbers each
+        *((f"{name}_at", _i8) for name in ("residual", "tried", "step", "local")),
+        *((f"{name}_at", _i8) for name in ("matrix", "place")),
     ],
     align=True,
 )

@@ -43,13 +43,13 @@ from .parameters import (
     EXACT,
     FALLING,
     FEWER,
-    HARDER,
-    HARDEST,
+    NEAR,
+    R_FALLS,
+    R_LEAST,
+    R_RISES,
     ROUGH,
     SHORTEST,
     STEPS,
-    TAMER,
-    TIGHTER,
 )
 from .rows import times
 
@@ -135,9 +135,9 @@ def find_islands(model: Any, memory: Any, everywhere: bool) -> None:
         column = columns_of(memory, rows[u])
         if rows[u].dim > 0 and len(column) > 0:
             rows[u].dof = column[0]
-            closed = rows[u].contact < 0 or contacts[rows[u].contact].state != OPEN
-            for c in column[: len(column) * closed]:
-                one, other = root(dofs, column[0]), root(dofs, c)
+            connects = rows[u].contact < 0 or contacts[rows[u].contact].state != OPEN
+            for n in range(len(column) if connects else 0):
+                one, other = root(dofs, column[0]), root(dofs, column[n])
                 dofs[max(one, other)].label = min(one, other)
     for i in range(model.nv - 1, -1, -1):
         first = root(dofs, i)
@@ -452,17 +452,19 @@ def solve_rigid_island(
     R falls from solution to solution, so that they come near sooner (Rockafellar 1976); it grows
     where Newton's method comes to no end. Then it is again what it was.
     """
-    gives_way, last, scale, solved, hardest = math.inf, math.inf, TAMER, True, False
+    gives_way, last, scale, solved, least = math.inf, math.inf, R_RISES, True, False
     multiply_R(memory, first, scale)
     for _ in range(memory.law.most):
-        if hardest and solved and gives_way <= enough and gives_way >= FALLING * last:
+        if least and solved and gives_way <= enough and gives_way >= FALLING * last:
             break
-        hardest |= scale <= HARDEST
-        solved = solve_island(model, data, memory, first, a, EXACT if hardest else ROUGH)
-        factor = TAMER
+        least |= scale <= R_LEAST
+        solved = solve_island(model, data, memory, first, a, EXACT if least else ROUGH)
+        factor = R_RISES
         if solved:
             last, gives_way = gives_way, hold_forces(memory, first)
-            factor = max(HARDER if gives_way > TIGHTER * enough else 0.0, HARDEST / scale)
+            factor = R_LEAST / scale
+            if gives_way > NEAR * enough:
+                factor = max(R_FALLS, factor)
         scale *= factor
         multiply_R(memory, first, factor)
     multiply_R(memory, first, 1 / scale)

@@ -91,11 +91,11 @@ the shortest."""
 SOFTER = 32.0
 """How much larger R is in a step that Newton's method solves, which holds forces until contacts
 give way no more."""
-HARDER, HARDEST, TAMER = 0.5, 2.0**-5, 4.0
-"""What R is multiplied by after a solution, until it is the part of what it was first; and where
-there is none. Powers of two, which are undone exactly."""
-TIGHTER = 0.02
-"""Part of `share` from which R is the least."""
+R_RISES, R_FALLS, R_LEAST = 4.0, 0.5, 2.0**-5
+"""Factors of an island's R: at the start, and where Newton's method comes to no end; after a
+solution; and all of them together at least. Powers of two, which are undone exactly."""
+NEAR = 0.02
+"""Part of `share` from which on R is the least."""
 FALLING = 0.1
 """Part to which what they give way must fall by a solution for another one to be tried, when it is
 little enough."""

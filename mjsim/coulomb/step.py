@@ -63,8 +63,7 @@ def law_of_a_step(m: int, d: int, at: int) -> None:
     """
     model, data, memory = models(m, 1)[0], datas(d, 1)[0], memories(at, 1)[0]
     memory.model, memory.data = m, d
-    gravity = size_of_gravity(model)
-    enough, rigid = memory.law.share * gravity, memory.law.rigid
+    rigid = memory.law.rigid
     if memory.law.kinetic < 1:
         strengthen(data, memory)
     known, over, since = begin(model, data, memory)
@@ -74,13 +73,15 @@ def law_of_a_step(m: int, d: int, at: int) -> None:
     if rigid:
         add_dampers(model, data, memory)
     moved = not known or not nothing_moved(model, data, memory)
-    find_contacts(model, data, memory, known, over, moved)
+    update_contacts(model, data, memory, known, over, moved)
     if memory.free_bodies:
         add_gyroscopic_moments(model, data, memory, known, over)
     memory.pending = memory.contacts + memory.dry > 0
     if not memory.pending:
         return
-    ask(model, data, memory, gravity, since if known and moved else 0.0)
+    gravity = size_of_gravity(model)
+    enough = memory.law.share * gravity
+    find_references(model, data, memory, gravity, since if known and moved else 0.0)
     if predict_slip(model, data, memory, enough, gravity) or not known:
         solve(model, data, memory, enough, gravity, known)
     elif rigid:
@@ -94,8 +95,10 @@ def law_of_a_step(m: int, d: int, at: int) -> None:
 
 
 @kernel
-def find_contacts(model: Any, data: Any, memory: Any, known: bool, over: bool, moved: bool) -> None:
-    """Find the contacts and rows of the step, and let them remember what those before bore."""
+def update_contacts(
+    model: Any, data: Any, memory: Any, known: bool, over: bool, moved: bool
+) -> None:
+    """Find the contacts and rows of the step; they remember what those before bore."""
     if not moved:
         read_gaps(data, memory)
         keep_forces(memory, over)
@@ -113,8 +116,8 @@ def find_contacts(model: Any, data: Any, memory: Any, known: bool, over: bool, m
 
 
 @kernel
-def ask(model: Any, data: Any, memory: Any, gravity: float, since: float) -> None:
-    """Find what rows ask for: MuJoCo's references, mended in mjData first, and then read.
+def find_references(model: Any, data: Any, memory: Any, gravity: float, since: float) -> None:
+    """Find what rows ask for: MuJoCo's references are mended in mjData, and then read.
 
     `since`: for how long contacts have turned along with their bodies, s; 0: they haven't.
     """
