@@ -26,12 +26,12 @@ from compare.bench.settled import (
     awake,
     loads_by_pair,
     measured_slip,
-    part,
     radii,
     settle,
     step_to_most_contacts,
     with_control,
 )
+from compare.kit.progress import part
 from model import InputError
 from model.errors import few
 

@@ -160,12 +160,6 @@ def with_control(control: Control | None, step: Advance = mujoco.mj_step) -> Adv
     return controlled
 
 
-def part(tell: Callable[[float], object], begin: float, end: float) -> Callable[[float], object]:
-    """A function to be called with the fraction done of a part of a work, between two fractions of
-    the whole."""
-    return lambda done: tell(begin + (end - begin) * done)
-
-
 def awake(model: Any) -> Any:
     """The model, or a copy of it in which MuJoCo puts no body to sleep."""
     sleep = int(mujoco.mjtEnableBit.mjENBL_SLEEP)

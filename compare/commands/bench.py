@@ -88,12 +88,13 @@ def run_forecast(args: argparse.Namespace) -> int:
     from rich.text import Text
 
     from compare.bench import forecast, forecast_page, settled
+    from compare.kit import progress
 
     creep = args.max_creep or forecast.Tolerances.creep
     tolerances = forecast.Tolerances(creep, args.max_depth)
     ends = (0, 1 / 2, 5 / 6, 1) if args.tries else (0, 1 / 2, 1, 1)  # shares of time, about
     settling, advising, trying = (
-        settled.part(args.tell, *both) for both in itertools.pairwise(ends)
+        progress.part(args.tell, *both) for both in itertools.pairwise(ends)
     )
     heard = mujoco.get_mju_user_warning()
     # it would write a log here; what it warns of is in the table

@@ -10,7 +10,7 @@ import tempfile
 from pathlib import Path
 
 from compare.commands import options, running, signals
-from compare.kit import collection, steady, sweep
+from compare.kit import collection, progress, steady, sweep
 from compare.kit.tasks import Task, failed_path, store
 from compare.view import motions
 from model import Flow, InputError, Parameters, storage, table
@@ -38,14 +38,13 @@ def run(args: argparse.Namespace) -> int:
         share = task.steps / (task.steps + WRITING * task.samples * as_table)  # of the run
         # The first signal ends the run with its samples, the second without.
         with signals.noted() as heard:
-            failure = store(
-                task, path, stop=lambda: bool(heard), tell=lambda done: args.tell(share * done)
-            )
+            tell = progress.part(args.tell, 0, share)
+            failure = store(task, path, stop=lambda: bool(heard), tell=tell)
         path = failed_path(path) if failure else path
         kept = failed_path(args.output) if args.output and failure else args.output
         if as_table:
             columns = motions.labelled(storage.load(path))
-            table.write(kept, columns, lambda done: args.tell(share + (1 - share) * done))
+            table.write(kept, columns, progress.part(args.tell, share, 1))
         if failure:  # now, since a signal may come before all else is said
             where = f"its samples so far are kept in {kept}"
             where = where if args.output else "nothing is kept without --output"

@@ -37,6 +37,12 @@ def show_nothing(what: str, done: int, total: int, failed: int) -> None:
     """A progress function that shows nothing."""
 
 
+def part(tell: Callable[[float], object], begin: float, end: float) -> Callable[[float], object]:
+    """A function to be called with the fraction done of a part of a work, between two fractions of
+    the whole."""
+    return lambda done: tell(begin + (end - begin) * done)
+
+
 class _Pace:
     """How fast something goes, by what was last said of it."""
 

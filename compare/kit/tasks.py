@@ -128,7 +128,7 @@ def store(
     path: Path,
     limit: float = math.inf,
     stop: Callable[[], bool] = lambda: False,
-    tell: Callable[[float], None] = lambda done: None,
+    tell: Callable[[float], object] = float,
 ) -> str:
     """Carry out one task into a file of its own; return why the run is not whole, or nothing.
 
