@@ -88,12 +88,12 @@ class ContactCase(Scene):
         A soft contact touches halfway between the body's own surface and the other."""
         body = self.bodies[-1]
         position, velocity, spin = np.split(states[:, -9:], 3, axis=1)
-        gaps, slips = [np.zeros((0, len(states)))], [np.zeros((0, len(states)))]
+        gaps, slips = list[Array](), list[Array]()
 
         def add_contact(gap: Array, slip: Array, normal: Array) -> None:
             along = slip - np.sum(slip * normal, axis=1)[:, None] * normal
-            gaps.append(gap[None])
-            slips.append(np.linalg.norm(along, axis=1)[None])
+            gaps.append(gap)
+            slips.append(np.linalg.norm(along, axis=1))
 
         for surface in self.surfaces:
             away = position - surface.point
@@ -115,7 +115,7 @@ class ContactCase(Scene):
             add_contact(gap, states[:, 3:6] - velocity, normal)
         if self.joint:
             add_contact(np.zeros(len(states)), velocity, np.zeros(3))
-        return np.concatenate(gaps).T, np.concatenate(slips).T
+        return np.stack(gaps, axis=1), np.stack(slips, axis=1)
 
     def in_contact(self, letters: str) -> Array:
         """Where contacts of the exact motion are in one of these states; (n, surfaces)."""

@@ -30,9 +30,9 @@ SPEED_ALONE = (math.inf, 0.01, math.inf)
 """Of a body that must not move: a creep of 0.1 mm/s passes; how far it sinks in is left out."""
 UP, WAY = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
 """The vertical, and the way of what goes along a level floor."""
-_Motion = tuple[Array, ...]
+Motion = tuple[Array, ...]
 """Position, velocity and spin, each (n, 3); then those of a body under the first."""
-Course = Callable[..., _Motion]
+Course = Callable[..., Motion]
 """The motion at times (n,) in s."""
 
 
@@ -45,24 +45,22 @@ def closed_form(
     *,
     wrong: Mapping[str, Mapping[str, Any]],
     until: float,
-    scales: tuple[float, float, float],
     contacts: tuple[str | float, ...],
-    source: str,
     under: Mapping[str, Any] | None = None,
-    **forces: Any,
+    **fields: Any,
 ) -> ContactCase:
     """A case whose course is a closed form; `wrong` are other constants of the course.
 
-    `contacts` are letters of `ContactCase.contacts`, between them when they change, s."""
+    `contacts` are letters of `ContactCase.contacts`, between them when they change, s; `fields` are
+    all that the case has as they stand."""
     times: Array = np.arange(1.0, 26.0) * (until / 25)
     letters, changes = contacts[::2], contacts[1::2]
 
-    def states_with(**constants: Any) -> Array:
-        return np.concatenate(
-            [np.broadcast_to(part, (25, 3)) for part in course(times, **constants)], axis=1
-        )
+    def states(t: Array, **constants: Any) -> Array:
+        parts = course(t, **constants)
+        return np.concatenate([np.broadcast_to(part, (len(t), 3)) for part in parts], axis=1)
 
-    start: Any = [tuple(np.broadcast_to(part, (1, 3))[0].tolist()) for part in course(np.zeros(1))]
+    start: Any = tuple(map(tuple, states(np.zeros(1)).reshape(-1, 3).tolist()))
     return ContactCase(
         name=name,
         about=about,
@@ -70,14 +68,12 @@ def closed_form(
         under=Body(*start[3:], **under) if under else None,
         surfaces=surfaces,
         times=times,
-        exact=states_with(),
+        exact=states(times),
         contacts=tuple(str(letters[bisect(changes, t)]) for t in times.tolist()),
         bound=CLOSED,
-        source=source,
-        scales=scales,
-        wrong={text: states_with(**constants) for text, constants in wrong.items()},
+        wrong={text: states(times, **constants) for text, constants in wrong.items()},
         g=G,
-        **forces,
+        **fields,
     )
 
 
@@ -96,12 +92,12 @@ def case(
 _case = partial(case, CLOSED_FORMS)
 
 
-def block(tilt: float = 0.0) -> dict[str, Any]:
+def block(tilt: float = 0.0, size: Vector = BLOCK, mass: float = 1.0) -> dict[str, Any]:
     """A block turned about the y axis by an angle, as fields of `Body`."""
-    x, y, z = (2 * half for half in BLOCK)
-    moments = ((y * y + z * z) / 12, (x * x + z * z) / 12, (x * x + y * y) / 12)
+    x, y, z = ((2 * half) ** 2 for half in size)
+    moments = (mass / 12 * (y + z), mass / 12 * (x + z), mass / 12 * (x + y))
     turn = (math.cos(tilt / 2), 0.0, math.sin(tilt / 2), 0.0)
-    return {"shape": "box", "size": BLOCK, "mass": 1.0, "inertia": moments, "orientation": turn}
+    return {"shape": "box", "size": size, "mass": mass, "inertia": moments, "orientation": turn}
 
 
 def sphere() -> dict[str, Any]:
@@ -115,14 +111,19 @@ def slope(angle: float) -> tuple[Array, Vector]:
     return down, (math.sin(angle), 0.0, math.cos(angle))
 
 
-def along(way: Array, s: Any, v: Any, spin: Any, start: Any) -> _Motion:
+def vectors(x: Any, y: Any, z: Any) -> Array:
+    """Vectors (n, 3) of these components, each (n,) or a number."""
+    return np.stack(np.broadcast_arrays(x, y, z), axis=1)
+
+
+def along(way: Array, s: Any, v: Any, spin: Any, start: Any) -> Motion:
     """Distance s, speed v along a straight way, and a spin about the horizontal across it."""
     across = np.array([-way[1], way[0], 0.0]) / math.hypot(way[0], way[1])
     return start + np.outer(s, way), np.outer(v, way), np.outer(spin, across)
 
 
 # fmt: off
-def _slides_down(t: Array, angle: float, mu: float = MU, v: float = 0.0) -> _Motion:
+def _slides_down(t: Array, angle: float, mu: float = MU, v: float = 0.0) -> Motion:
     """A block on a slope with a speed v at first; where friction is stronger it stops."""
     way, normal = slope(angle)
     a = G * (math.sin(angle) - mu * math.cos(angle))
@@ -167,7 +168,7 @@ _on_slope(
     until=1.0, scales=(0.1, 0.5, math.inf), contacts=("R", MU * G / 10.0, "S"),
     source="Coulomb's law: m x'' = 10 t - mu m g from when that is positive",
     growth=(10.0, 0.0, 0.0))
-def _pulled_ever_harder(t: Array, mu: float = MU, grip: float = 1.0) -> _Motion:
+def _pulled_ever_harder(t: Array, mu: float = MU, grip: float = 1.0) -> Motion:
     """A block pulled by a force that grows by 10 N each second until it slides."""
     late = np.maximum(t - grip * mu * G / 10.0, 0.0)
     a0 = (grip - 1) * mu * G
@@ -188,11 +189,11 @@ _PUSH = G / (0.5 * MU)
     until=2.0, scales=SPEED_ALONE, contacts=("R",),
     source="statics: half of mu times the force carries the weight, the pressure stays on the face",
     pull=(_PUSH, 0.0, 0.0))
-def _pressed_to_wall(t: Array, mu: float = MU) -> _Motion:
+def _pressed_to_wall(t: Array, mu: float = MU) -> Motion:
     """A block pressed to a wall: friction holds it, or it falls along the wall."""
     fall = max(G - mu * _PUSH, 0.0)
     start = np.array([-BLOCK[0], 0.0, 1.0])
-    return start - np.outer(fall * t**2 / 2, UP), -np.outer(fall * t, UP), np.zeros((len(t), 3))
+    return start - np.outer(fall * t**2 / 2, UP), -np.outer(fall * t, UP), np.zeros(3)
 
 
 @_case(
@@ -203,7 +204,7 @@ def _pressed_to_wall(t: Array, mu: float = MU) -> _Motion:
            "it slides on": {"j": 1e9}},
     until=1.0, scales=(1.0, 1.0, 10.0), contacts=("S", 4.0 / (7 * 0.2 * G), "R"),
     source="Newton and Euler with constant friction mu m g; rolling from t = 2 v/(7 mu g)")
-def _slides_then_rolls(t: Array, mu: float = 0.2, j: float = J) -> _Motion:
+def _slides_then_rolls(t: Array, mu: float = 0.2, j: float = J) -> Motion:
     """A sphere pushed off at 2 m/s without spin: slides until v/r = spin, at 2/(mu g (1 + 1/j)),
     then rolls."""
     slid = np.minimum(t, 2.0 / (mu * G * (1 + 1 / j)))
@@ -211,7 +212,7 @@ def _slides_then_rolls(t: Array, mu: float = 0.2, j: float = J) -> _Motion:
     return along(WAY, s + v * (t - slid), v, mu * G * slid / (j * RADIUS), RADIUS * UP)
 
 
-def _rolls_down(t: Array, angle: float, mu: float = 0.5, j: float = J) -> _Motion:
+def _rolls_down(t: Array, angle: float, mu: float = 0.5, j: float = J) -> Motion:
     """A sphere from rest on a slope: rolls if tan <= mu (1 + 1/j), else slips."""
     way, normal = slope(angle)
     a = max(G * math.sin(angle) / (1 + j), G * (math.sin(angle) - mu * math.cos(angle)))
@@ -244,7 +245,7 @@ _case(
     "a sphere spins about the vertical on a point, where friction has no arm: it spins for ever",
     sphere(), (Surface("floor", MU),), wrong={"a damping of 5 % a second": {"decay": 0.05}},
     until=2.0, scales=(0.1, 1.0, 20.0), contacts=("R",), source="a point contact carries no moment")
-def _spins_on_the_spot(t: Array, decay: float = 0.0) -> _Motion:
+def _spins_on_the_spot(t: Array, decay: float = 0.0) -> Motion:
     """A sphere that spins about the vertical for ever."""
     return RADIUS * UP, np.zeros(3), np.outer(20.0 * np.exp(-decay * t), UP)
 
@@ -259,12 +260,11 @@ _TURNING = 3.0
     wrong={"a hollow sphere": {"j": 2 / 3}, "it goes with the table": {"j": 1e9}},
     until=4.0, scales=(0.5, 0.5, 15.0), contacts=("R",),
     source="Weltner, Am. J. Phys. 47 (1979): v' = 2/7 turning z x v for a uniform ball")
-def _circles_on_turntable(t: Array, j: float = J) -> _Motion:
+def _circles_on_turntable(t: Array, j: float = J) -> Motion:
     """A sphere on a turntable, x'' = k turning z x x' with k = j/(1 + j): it circles."""
     k = _TURNING * j / (1 + j)
-    cos, sin, none = np.cos(k * t), np.sin(k * t), 0 * t
-    place = 0.5 * np.stack([cos, sin, none], axis=1)
-    way = 0.5 * k * np.stack([-sin, cos, none], axis=1)
+    cos, sin = np.cos(k * t), np.sin(k * t)
+    place, way = 0.5 * vectors(cos, sin, 0.0), 0.5 * k * vectors(-sin, cos, 0.0)
     rolling = np.cross(UP, way - np.cross(_TURNING * UP, place)) / RADIUS
     return place + RADIUS * UP, way, rolling
 
@@ -284,12 +284,12 @@ _CYLINDER = Parameters(m=1.0, r=RADIUS, R=_ORBIT, j=J, mu=1.0, eta=1.0, g=G, c=0
     until=2.0, scales=(1.0, 8.0, 80.0), contacts=("R",),
     source="Newton and Euler in the turning frame: the spin along the radius changes with height",
     motion=(_CYLINDER, State(y=10.0, omega_c=_TURNS, slip_x=-_TURNS * _ORBIT / RADIUS)))
-def _rolls_in_cylinder(t: Array, j: float = J) -> _Motion:
+def _rolls_in_cylinder(t: Array, j: float = J) -> Motion:
     """A sphere rolling in a cylinder: z'' = -g/(1 + j) - k^2 z, k^2 = turns^2 j/(1 + j)."""
     k = _TURNS * math.sqrt(j / (1 + j))
     deep = G / (j * _TURNS**2)
     z, fall = -deep * (1 - np.cos(k * t)), -deep * k * np.sin(k * t)
-    out = np.stack([np.cos(_TURNS * t), np.sin(_TURNS * t), 0 * t], axis=1)
+    out = vectors(np.cos(_TURNS * t), np.sin(_TURNS * t), 0.0)
     on = np.cross(UP, out)
     turned = (_TURNS * z / RADIUS)[:, None] * out - _ORBIT * _TURNS / RADIUS * UP
     spin = turned + (fall / RADIUS)[:, None] * on
@@ -304,7 +304,7 @@ def _groove(angle: float, mu: float) -> tuple[Surface, Surface]:
     return Surface("left", mu, normal=left), Surface("right", mu, normal=right)
 
 
-def _descends(t: Array, angle: float, lever: float = 2 * J, mu: float = 9.0) -> _Motion:
+def _descends(t: Array, angle: float, lever: float = 2 * J, mu: float = 9.0) -> Motion:
     """A body goes down a groove at g sin/(1 + j/sin^2 45) if it rolls, faster if it slips.
 
     Each plane of the groove carries m g cos/sqrt(2)."""

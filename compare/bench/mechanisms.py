@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -23,28 +22,19 @@ from compare.bench.closed_forms import (
     UP,
     WAY,
     G,
+    Motion,
     along,
     block,
     case,
     slope,
     sphere,
+    vectors,
 )
 from model.arrays import Array
 
 MECHANISMS: list[Callable[[], ContactCase]] = []
 """Functions that make these cases, in the order in which they are listed."""
 _case = partial(case, MECHANISMS)
-_Motion = tuple[Array, ...]
-
-
-def _plate(mass: float, tilt: float, size: tuple[float, float, float]) -> dict[str, Any]:
-    """A box of a size and mass, turned about the y axis, as fields of `Body`."""
-    x, y, z = (2 * half for half in size)
-    moments = tuple(
-        mass / 12 * sum(pair) for pair in ((y * y, z * z), (x * x, z * z), (x * x, y * y))
-    )
-    return block(tilt) | {"size": size, "mass": mass, "inertia": moments}
-
 
 # fmt: off
 _FOOT, _OUT, _DOWN, _MOMENT = 0.01, 0.1, 0.04, 0.006
@@ -77,7 +67,7 @@ def integrated(rates: Callable[[float, Array], Array], start: Array, t: Array) -
     TRIPOD, (Surface("floor", 0.3),), wrong=WRONG_TRIPODS,
     until=0.3, scales=(0.1, 0.5, 5.0), contacts=("S",), source=BALANCE)
 def tripod(t: Array, mu: float = 0.3, height: float = _FOOT + _DOWN, share: float = 1.0,
-           start: tuple[float, float] = (0.0, 10.0), pyramid: bool = False) -> _Motion:
+           start: tuple[float, float] = (0.0, 10.0), pyramid: bool = False) -> Motion:
     """Position, velocity and spin of a tripod of 1 kg each foot of which bears what keeps it from
     tilting.
 
@@ -101,9 +91,7 @@ def tripod(t: Array, mu: float = 0.3, height: float = _FOOT + _DOWN, share: floa
 
     first = np.array([0.0, 0.0, 0.0, 1.5 * math.cos(way), 1.5 * math.sin(way), start[1]])
     x, y, _, v_x, v_y, rate = integrated(rates, first, t)
-    none = 0 * t
-    place = np.stack([x, y, none + _FOOT + _DOWN], axis=1)
-    return place, np.stack([v_x, v_y, none], axis=1), np.outer(rate, UP)
+    return vectors(x, y, _FOOT + _DOWN), vectors(v_x, v_y, 0.0), np.outer(rate, UP)
 
 
 _PLANK = (0.6, 0.2, 0.02)
@@ -124,8 +112,8 @@ _STOP = _MEET + (_SPEED - _ABOVE * G * _MEET) / (_BELOW * G)
            "the plank is held": {"below": _ABOVE}},
     until=1.2, scales=(0.2, 0.5, math.inf), contacts=("SS", _MEET, "SR", _STOP, "RR"),
     source="Coulomb's law and Newton's third: m mu g drives the plank, mu' (m + M) g brakes it",
-    under=_plate(_HEAVIER, 0.0, _PLANK), between=_ABOVE)
-def _dragged(t: Array, above: float = _ABOVE, below: float = _BELOW, load: float = 1.0) -> _Motion:
+    under=block(0.0, _PLANK, _HEAVIER), between=_ABOVE)
+def _dragged(t: Array, above: float = _ABOVE, below: float = _BELOW, load: float = 1.0) -> Motion:
     """A block that slides on a plank slows by mu g and draws the plank until both go together, then
     stop.
 
@@ -151,12 +139,12 @@ _LEAN = math.atan(0.9 * 0.5)
     "thousandfold",
     "a block of 1000 kg on one of 1 kg on a slope whose tangent is 0.9 of their friction: neither "
     "must move",
-    _plate(1000.0, _LEAN, (0.2, 0.2, 0.2)), (Surface("slope", 0.5, normal=slope(_LEAN)[1]),),
+    block(_LEAN, (0.2, 0.2, 0.2), 1000.0), (Surface("slope", 0.5, normal=slope(_LEAN)[1]),),
     wrong={"a threshold at 0.85 of Coulomb's": {"mu": 0.425}},
     until=2.0, scales=SPEED_ALONE, contacts=("RR",), source="Coulomb's law: whatever the masses, "
                                                             "tan < mu holds both",
-    under=_plate(1.0, _LEAN, (0.2, 0.2, 0.1)), between=0.5)
-def _stays(t: Array, mu: float = 0.5) -> _Motion:
+    under=block(_LEAN, (0.2, 0.2, 0.1)), between=0.5)
+def _stays(t: Array, mu: float = 0.5) -> Motion:
     """Two blocks on a slope, the lower of which slides where friction is the weaker."""
     way, normal = slope(_LEAN)
     a = max(G * (math.sin(_LEAN) - mu * math.cos(_LEAN)), 0.0)
@@ -179,7 +167,7 @@ _INCLINE, _DOWNHILL = math.atan(0.3), 0.8
     until=2.0, scales=(0.5, 0.5, math.inf),
     contacts=("S", (_DOWNHILL + 1.0) / (G * (0.5 * math.cos(_INCLINE) - math.sin(_INCLINE))), "R"),
     source="Coulomb's law against the slip on the belt, integrated by hand")
-def _rides(t: Array, mu: float = 0.5, belt: float = 1.0) -> _Motion:
+def _rides(t: Array, mu: float = 0.5, belt: float = 1.0) -> Motion:
     """A block that slides down a belt is slowed by g (mu cos - sin) until it goes up with the
     belt."""
     a = G * (mu * math.cos(_INCLINE) - math.sin(_INCLINE))
@@ -197,7 +185,7 @@ def _rides(t: Array, mu: float = 0.5, belt: float = 1.0) -> _Motion:
     until=1.6, scales=(0.3, 3.0, math.inf), contacts=("S", 4 * math.pi / 10, "R"),
     source="m x'' = -k x -+ F: half circles in the phase plane about -+ F/k",
     spring=100.0, joint=(1.0, 0.0, 0.0), dry=4.0)
-def _swings(t: Array, dry: float = 4.0, stiffness: float = 100.0, start: float = 0.3) -> _Motion:
+def _swings(t: Array, dry: float = 4.0, stiffness: float = 100.0, start: float = 0.3) -> Motion:
     """Half swings about -+ dry/stiffness: each ends 2 dry/stiffness nearer, then sticks."""
     rate, shift = math.sqrt(stiffness), dry / stiffness
     half = np.floor(t * rate / math.pi)
@@ -213,7 +201,7 @@ _HALF, _LEANS = (0.25, 0.5, 1.0), 0.12
 """Half edges of the rocking block, m, and how it leans at first, rad."""
 _ARM, _ALPHA = math.hypot(_HALF[0], _HALF[2]), math.atan2(_HALF[0], _HALF[2])
 """From an edge to the centre: how far, m, and the angle with the vertical."""
-_ROCKING = _plate(1.0, _LEANS, _HALF)
+_ROCKING = block(_LEANS, _HALF)
 _MOMENT_OF_EDGE = _ROCKING["inertia"][1] + _ARM**2
 _KEPT = 1 - _ARM**2 / _MOMENT_OF_EDGE * (1 - math.cos(2 * _ALPHA))
 
@@ -229,7 +217,7 @@ _KEPT = 1 - _ARM**2 / _MOMENT_OF_EDGE * (1 - math.cos(2 * _ALPHA))
     until=0.8, scales=(0.2, 1.0, 1.0), contacts=("T",),
     source="Housner, Bull. Seismol. Soc. Am. 53 (1963): a pendulum upside down, momentum about the "
            "new edge")
-def _rocks(t: Array, kept: float = _KEPT, moment: float = _MOMENT_OF_EDGE) -> _Motion:
+def _rocks(t: Array, kept: float = _KEPT, moment: float = _MOMENT_OF_EDGE) -> Motion:
     """A pendulum upside down about an edge: from rest at an angle to upright and beyond.
 
     With the angle psi of the centre from straight below the edge, psi = pi - alpha + lean, it is
@@ -255,9 +243,8 @@ def _rocks(t: Array, kept: float = _KEPT, moment: float = _MOMENT_OF_EDGE) -> _M
         top = alpha - math.acos(math.cos(alpha) + risen)
     # of the way from the edge to the centre, from the vertical
     tilt = np.sign(angle) * alpha - angle
-    place = np.stack([np.sign(angle) * _HALF[0] - arm * np.sin(tilt), 0 * t, arm * np.cos(tilt)],
-                     axis=1)
-    velocity = np.stack([arm * np.cos(tilt) * rate, 0 * t, arm * np.sin(tilt) * rate], axis=1)
+    place = vectors(np.sign(angle) * _HALF[0] - arm * np.sin(tilt), 0.0, arm * np.cos(tilt))
+    velocity = vectors(arm * np.cos(tilt) * rate, 0.0, arm * np.sin(tilt) * rate)
     return place, velocity, np.outer(rate, [0.0, 1.0, 0.0])
 
 
@@ -267,19 +254,17 @@ def _rocks(t: Array, kept: float = _KEPT, moment: float = _MOMENT_OF_EDGE) -> _M
     wrong={"0.65 of it": {"share": 0.65}, "all of it": {"share": 1.0}},
     until=2.0, scales=(1.0, 6.0, 10.0), contacts=("N",), source="Newton's law of restitution, "
                                                                 "parabolas between")
-def _bounces(t: Array, share: float = 0.7, drop: float = 1.8) -> _Motion:
+def _bounces(t: Array, share: float = 0.7, drop: float = 1.8) -> Motion:
     """A ball falls and bounces in parabolas: each impact leaves `share` of the speed."""
     speed, begin = math.sqrt(2 * G * drop), math.sqrt(2 * drop / G)
     z, v = drop - G * t**2 / 2, -G * t
     while begin < t[-1]:
         speed *= share
         since = t - begin
-        z, v = np.where(since < 0, z,
-                        speed * since - G * since**2 / 2), np.where(since < 0, v, speed - G * since)
+        z = np.where(since < 0, z, speed * since - G * since**2 / 2)
+        v = np.where(since < 0, v, speed - G * since)
         begin += 2 * speed / G
-    none = 0 * t
-    return np.stack([none, none, 0.1 + z],
-                    axis=1), np.stack([none, none, v], axis=1), np.zeros((len(t), 3))
+    return vectors(0.0, 0.0, 0.1 + z), vectors(0.0, 0.0, v), np.zeros(3)
 
 
 _RADIUS, _THICK, _TILT = 0.2, 0.02, math.radians(80)
@@ -297,7 +282,7 @@ _ACROSS = _RADIUS**2 / 4 + _THICK**2 / 3
            "no gyroscopic moment": {"share": 0.0}},
     until=1.2, scales=(2.0, 1.0, 5.0), contacts=("T",),
     source="balances of momentum and angular momentum in axes that go round with the disc")
-def _rolls_round(t: Array, ring: float = 0.5, half: float = _THICK, share: float = 1.0) -> _Motion:
+def _rolls_round(t: Array, ring: float = 0.5, half: float = _THICK, share: float = 1.0) -> Motion:
     """Steady rolling on the rim, round a circle at the rate Omega, the axis at `lean`.
 
     The lowest point of the rim is at c = (c_r, c_z) from the centre, outwards and up. With the spin
@@ -312,8 +297,7 @@ def _rolls_round(t: Array, ring: float = 0.5, half: float = _THICK, share: float
     gain = share * turning * about * sin + c_z * turning**2 * by_spin
     rest = share * turning**2 * sin * cos * (across - about) - c_r * G - c_z * turning**2 * fixed
     s = rest / gain
-    rho, none = fixed + by_spin * s, 0 * t
-    out = np.stack([np.cos(turning * t), np.sin(turning * t), none], axis=1)
-    along = np.stack([-out[:, 1], out[:, 0], none], axis=1)
+    rho, out = fixed + by_spin * s, vectors(np.cos(turning * t), np.sin(turning * t), 0.0)
+    along = vectors(-out[:, 1], out[:, 0], 0.0)
     return rho * out - c_z * UP, turning * rho * along, s * sin * out + (turning + s * cos) * UP
 # fmt: on
