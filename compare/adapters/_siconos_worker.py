@@ -54,13 +54,8 @@ class Scene:
         x, y, z = position
         self.azimuth, h, r = math.atan2(y, x), self.R - math.hypot(x, y), self.r
         self.axes = turned(self.azimuth)
-        ball = TurningBall(
-            [-h, 0, z - r, 0, 0, 0],
-            [*self.axes @ velocity, *self.axes @ spin],
-            self.mass,
-            self.inertia,
-            self.R,
-        )
+        rates = [*self.axes @ velocity, *self.axes @ spin]
+        ball = TurningBall([-h, 0, z - r, 0, 0, 0], rates, self.mass, self.inertia, self.R)
         floor = [[0, 0, 1, 0, 0, 0], [1, 0, 0, 0, -r, 0], [0, 1, 0, r, 0, 0]]
         wall = [[-1, 0, 0, 0, 0, 0], [0, 1, 0, 0, 0, r], [0, 0, 1, 0, -r, 0]]
         given = self.given
@@ -71,9 +66,8 @@ class Scene:
             if friction is None:  # there is no floor
                 continue
             law = kernel.NewtonImpactFrictionNSL(0.0, 0.0, friction, 3)
-            self.contacts.append(
-                kernel.Interaction(law, kernel.LagrangianLinearTIR(np.array(rows, float)))
-            )
+            relation = kernel.LagrangianLinearTIR(np.array(rows, float))
+            self.contacts.append(kernel.Interaction(law, relation))
             system.link(self.contacts[-1], ball)
         solver = kernel.FrictionContact(3)
         options = solver.numericsSolverOptions()

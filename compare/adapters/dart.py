@@ -6,6 +6,7 @@ lesser of both bodies' coefficients."""
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -35,7 +36,7 @@ class Dart(Free):
             self.world.setCollisionDetector(engine.collision.OdeCollisionDetector())
             solver.setBoxedLcpSolver(self.cone)
             solver.setSplitImpulseEnabled(True)
-        self.tables: list[tuple[Any, float]] = []
+        self.driven: list[tuple[Any, float]] = []
         self.surfaces: dict[str, int] = {}
         for surface, name, point, normal in self.planes():
             skeleton = bodies.Skeleton(name)
@@ -44,15 +45,12 @@ class Dart(Free):
                 self.wall, node = skeleton.createTranslationalJointAndBodyNodePair()
                 self.wall.setActuatorType(bodies.ActuatorType.VELOCITY)
                 node.setGravityMode(False)
-            elif rate := surface.turning or math.hypot(*surface.velocity):
-                turns = skeleton.createRevoluteJointAndBodyNodePair
-                slides = skeleton.createPrismaticJointAndBodyNodePair
-                joint, node = turns() if surface.turning else slides()
-                joint.setAxis(
-                    [0.0, 0.0, 1.0] if surface.turning else np.array(surface.velocity) / rate
-                )
-                joint.setActuatorType(bodies.ActuatorType.VELOCITY)
-                self.tables.append((joint, rate))
+            elif surface.turning:
+                joint, node = skeleton.createRevoluteJointAndBodyNodePair()
+                self.drive(joint, [0.0, 0.0, 1.0], surface.turning)
+            elif speed := math.hypot(*surface.velocity):
+                joint, node = skeleton.createPrismaticJointAndBodyNodePair()
+                self.drive(joint, np.array(surface.velocity) / speed, speed)
             else:
                 _, node = skeleton.createWeldJointAndBodyNodePair()
             self.plane = bodies.PlaneShape(normal, point)  # the last one is the one that moves
@@ -97,15 +95,20 @@ class Dart(Free):
         if not self.world.hasSkeleton(skeleton):
             self.world.addSkeleton(skeleton)
 
+    def drive(self, joint: Any, axis: Any, rate: float) -> None:
+        """Let a joint of one axis go at a rate, m/s or rad/s."""
+        joint.setAxis(axis)
+        joint.setActuatorType(engine.dynamics.ActuatorType.VELOCITY)
+        self.driven.append((joint, rate))
+
     def advance(self) -> None:
-        for joint, turning in self.tables:
-            joint.setCommand(0, turning)
+        for joint, rate in self.driven:
+            joint.setCommand(0, rate)
         super().advance()
 
     def read(self) -> BodyState:
-        return sum(
-            ((n.getCOM(), n.getLinearVelocity(), n.getAngularVelocity()) for n in self.nodes), ()
-        )
+        own = ((n.getCOM(), n.getLinearVelocity(), n.getAngularVelocity()) for n in self.nodes)
+        return tuple(itertools.chain.from_iterable(own))
 
     def push(self, force: Vector) -> None:
         self.nodes[0].setExtForce(force, np.zeros(3), False, True)

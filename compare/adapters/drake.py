@@ -49,11 +49,8 @@ class Drake(Free):
     def make(self) -> None:
         scene, body = self.scene, self.scene.body
         self.most = max(surface.friction for surface in scene.surfaces)
-        builder = engine.DiagramBuilder()
-        self.plant, graph = engine.AddMultibodyPlantSceneGraph(
-            builder, engine.MultibodyPlant(self.timestep)
-        )
-        plant = self.plant
+        builder, plant = engine.DiagramBuilder(), engine.MultibodyPlant(self.timestep)
+        self.plant, graph = engine.AddMultibodyPlantSceneGraph(builder, plant)
         plant.set_contact_model(engine.ContactModel.kPoint)
         solver = engine.DiscreteContactApproximation
         plant.set_discrete_contact_approximation(solver.kTamsi if self.best else solver.kLagged)
@@ -64,32 +61,25 @@ class Drake(Free):
         self.own = ball.index()
         for k, (place, shape) in enumerate(self.shapes()):
             self.add(ball, place, shape, f"body{k}")
-        moving = [
-            surface for surface in scene.surfaces if self.goes_along(surface) or surface.turning
-        ]
+        moving = [each for each in scene.surfaces if self.goes_along(each) or each.turning]
         walls = {surface.name: self.moving_body(surface) for surface in moving}
         self.surfaces = {}
         for surface, name, point, normal in self.planes():
             of = walls.get(surface.name, plant.world_body())
             if self.goes_along(surface):
                 point, normal = np.zeros(3), np.array([-1.0, 0.0, 0.0])
-            self.surfaces[self.plane(of, point, normal, name, surface)] = scene.surfaces.index(
-                surface
-            )
-        apart = engine.CollisionFilterDeclaration().ExcludeWithin(
-            engine.GeometrySet([*self.surfaces])
-        )
-        graph.collision_filter_manager().Apply(apart)
+            number = self.plane(of, point, normal, name, surface)
+            self.surfaces[number] = scene.surfaces.index(surface)
+        fixed, filters = engine.GeometrySet([*self.surfaces]), engine.CollisionFilterDeclaration()
+        graph.collision_filter_manager().Apply(filters.ExcludeWithin(fixed))
         plant.Finalize()
         if self.best:
             plant.set_stiction_tolerance(STICTION)
         self.diagram = builder.Build()  # which, as its context, must outlive the plant's
         self.root = self.diagram.CreateDefaultContext()
         self.context = plant.GetMyMutableContextFromRoot(self.root)
-        self.force, self.x = (
-            np.zeros(plant.num_velocities()),
-            plant.GetPositionsAndVelocities(self.context),
-        )
+        self.force = np.zeros(plant.num_velocities())
+        self.x = plant.GetPositionsAndVelocities(self.context)
         self.ball = self.wall = self.state_slices(ball)
         self.x[self.ball[0]] = [*body.orientation, *body.position]
         self.x[self.ball[1]] = [*body.spin, *body.velocity]
@@ -116,37 +106,29 @@ class Drake(Free):
     def shapes(self) -> list[tuple[Any, Any]]:
         """Shapes of the body with their poses; a box in the best settings is its corners."""
         body = self.scene.body
-        if body.shape == "sphere" or not self.best:
-            whole = (
-                engine.Sphere(*body.size)
-                if body.shape == "sphere"
-                else engine.Box(*(2 * np.array(body.size)))
-            )
-            return [(engine.RigidTransform(), whole)]
-        corners = itertools.product(*((-half, half) for half in body.size))
-        return [
-            (engine.RigidTransform(np.array(corner)), engine.Sphere(1e-9)) for corner in corners
-        ]
+        if body.shape == "sphere":
+            return [(engine.RigidTransform(), engine.Sphere(*body.size))]
+        if not self.best:
+            return [(engine.RigidTransform(), engine.Box(*(2 * np.array(body.size))))]
+        corners = map(np.array, itertools.product(*((-half, half) for half in body.size)))
+        return [(engine.RigidTransform(corner), engine.Sphere(1e-9)) for corner in corners]
 
     def add(self, of: Any, pose: Any, shape: Any, name: str, friction: float | None = None) -> Any:
         """Register a shape; `friction` is that of the pair of a surface, None for the body."""
         material, mu = engine.ProximityProperties(), self.most
         if friction is not None:  # the harmonic mean of both is the pair's
             mu = mu * friction / (2 * mu - friction) if friction else 0.0
-        springs = {"dissipation": DISSIPATION, "point_stiffness": STIFFNESS} if self.best else {}
-        engine.AddContactMaterial(
-            **springs, friction=engine.CoulombFriction(mu, mu), properties=material
-        )
+        given = {"dissipation": DISSIPATION, "point_stiffness": STIFFNESS} if self.best else {}
+        given |= {"friction": engine.CoulombFriction(mu, mu), "properties": material}
+        engine.AddContactMaterial(**given)
         return self.plant.RegisterCollisionGeometry(of, pose, shape, name, material)
 
     def plane(self, of: Any, point: Array, normal: Array, name: str, surface: Surface) -> Any:
         """Register a plane: a half space, or a side of a cube: many half spaces crash it."""
-        size = (
-            0.0 if self.best else SIZE * max((each.radius or 0.0) for each in self.scene.surfaces)
-        )
-        if not size:
+        if self.best or not self.scene.in_cylinder:
             pose, shape = engine.HalfSpace.MakePose(normal, point), engine.HalfSpace()
         else:
+            size = SIZE * max(each.radius or 0.0 for each in self.scene.surfaces)
             turn = engine.RotationMatrix.MakeFromOneVector(normal, 2)
             pose = engine.RigidTransform(turn, point - size / 2 * normal)
             shape = engine.Box(size, size, size)
@@ -161,9 +143,8 @@ class Drake(Free):
     def advance(self) -> None:
         self.plant.get_applied_generalized_force_input_port().FixValue(self.context, self.force)
         self.plant.SetPositionsAndVelocities(self.context, self.x)
-        self.x = (
-            self.plant.EvalUniquePeriodicDiscreteUpdate(self.context).get_vector(0).CopyToVector()
-        )
+        after = self.plant.EvalUniquePeriodicDiscreteUpdate(self.context)
+        self.x = after.get_vector(0).CopyToVector()
 
     def read(self) -> BodyState:
         pose, rate = (self.x[part] for part in self.ball)
@@ -180,12 +161,10 @@ class Drake(Free):
     def touches(self) -> list[Touch]:
         results = self.plant.get_contact_results_output_port().Eval(self.context)
         shown = []
-        for info in (
-            results.point_pair_contact_info(k) for k in range(results.num_point_pair_contacts())
-        ):
-            # it acts on the second body
+        for k in range(results.num_point_pair_contacts()):
+            info = results.point_pair_contact_info(k)
             pair = info.point_pair()
-            sign = 1 if info.bodyB_index() == self.own else -1
+            sign = 1 if info.bodyB_index() == self.own else -1  # it acts on the second body
             surface = self.surfaces[pair.id_A if sign > 0 else pair.id_B]
             shown.append(Touch(surface, sign * info.contact_force(), -pair.depth))
         return shown
@@ -198,5 +177,5 @@ best = Drake(
     "drake",
     "a body that lands overlaps by up to a step's way, and comes out slowly",
     f"TAMSI, {STIFFNESS:.0e} N/m, stiction tolerance {STICTION:g} m/s; a box touches by its "
-    f"corners",
+    "corners",
 )

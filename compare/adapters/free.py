@@ -108,13 +108,9 @@ class Free(ABC):
     def __init__(self, name: str, note: str, best: str = "") -> None:
         """`note`: what is worst, and why; `best` declares settings that aren't its own."""
         self.NAME, self.NOTE, self.best = name, note, bool(best)
-        moved = (
-            "one plane that goes with the body for a cylinder; positions half a step ahead of "
-            "velocities"
-        )
-        self.DECLARED = "; ".join(
-            filter(None, (moved if best else f"{FACETS} planes for a cylinder", best))
-        )
+        moved = "one plane that goes with the body for a cylinder; positions half a step ahead of "
+        moved += f"velocities; {best}"
+        self.DECLARED = moved if best else f"{FACETS} planes for a cylinder"
         self.scene: Scene
         self.world: Any
         self.timestep = self.now = self.ahead = 0.0
@@ -131,19 +127,17 @@ class Free(ABC):
     def step(self, n: int) -> None:
         """Take n steps."""
         scene = self.scene
-        radii = [surface.radius or 0.0 for surface in scene.surfaces if self.goes_along(surface)]
-        half, reach = self.timestep / 2, scene.body.size[0]
+        wall = next((each.radius for each in scene.surfaces if self.goes_along(each)), None)
         for _ in range(n):
-            if scene.forced or radii:
-                position, velocity, spin, *_ = self.look()
-                if scene.forced:
-                    self.push(scene.force(self.now, position, velocity))
-                for radius in radii:
-                    azimuth = math.atan2(position[1], position[0])
-                    inwards, up = against(position, velocity, spin, half, radius - reach, reach)
-                    point, normal = tangent(radius, azimuth)
-                    point[2] = position[2]
-                    self.turn(point, normal, np.append(inwards * normal[:2], up))
+            if scene.forced:
+                self.push(scene.force(self.now, *self.look()[:2]))
+            if wall:
+                position, velocity, spin = self.look()
+                half, r = self.timestep / 2, scene.body.size[0]
+                inwards, up = against(position, velocity, spin, half, wall - r, r)
+                point, normal = tangent(wall, math.atan2(position[1], position[0]))
+                point[2] = position[2]
+                self.turn(point, normal, np.append(inwards * normal[:2], up))
             self.advance()
             self.seen = None
             self.now += self.timestep
@@ -183,13 +177,12 @@ class Free(ABC):
     def read(self) -> BodyState:
         """Read the state as the engine has it."""
 
+    @abstractmethod
     def push(self, force: Vector) -> None:
         """Set the force on the centre for the next step, N."""
-        raise NotImplementedError("it takes no forces")
 
-    def turn(self, point: Array, normal: Array, velocity: Array) -> None:
-        """Place the plane that stands for the cylinder, with its velocity, m/s."""
-        raise NotImplementedError("its planes can't be moved")
+    def turn(self, point: Array, normal: Array, velocity: Array) -> None:  # noqa: B027
+        """Place the plane that stands for a cylinder in best settings, with its velocity, m/s."""
 
     def touches(self) -> list[Touch]:
         """The contact points of the last step, of an engine that `TELLS`."""

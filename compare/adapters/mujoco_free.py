@@ -74,14 +74,12 @@ class Bodies(Free):
 
     def touches(self) -> list[Touch]:
         shown, force, contact = [], np.empty(6), self.data.contact
-        for k, (one, other, frame, gap) in enumerate(
-            zip(contact.geom1, contact.geom2, contact.frame, contact.dist.tolist(), strict=True)
-        ):
+        for k, (one, other) in enumerate(contact.geom):
             mujoco.mj_contactForce(self.model, self.data, k, force)  # on the second geom
             on_surface = self.surfaces[one] < 0 <= self.surfaces[other]
-            on_body = (-force[:3] if on_surface else force[:3]) @ frame.reshape(3, 3)
+            on_body = (-force[:3] if on_surface else force[:3]) @ contact.frame[k].reshape(3, 3)
             surface = self.surfaces[other if on_surface else one]
-            shown.append(Touch(surface, on_body, gap))
+            shown.append(Touch(surface, on_body, float(contact.dist[k])))
         return shown
 
 

@@ -16,7 +16,6 @@ from model.kinematics import rotated
 
 warp.config.quiet = True
 
-
 _WORST = (
     "worst where MuJoCo is, and as much: in facets, and with what must not move, since its soft "
     "friction creeps; nothing is seen of single precision beside that"
@@ -28,7 +27,6 @@ class Warp(mujoco_free.Bodies):
 
     PRECISION = "f32"
     TIMESTEPS = (4e-3, 2e-3)  # a step takes 5 ms, a thousand times MuJoCo's
-
     FEATURES = ("moving surface", "tripod", "disc")
 
     def make(self) -> None:
@@ -39,10 +37,8 @@ class Warp(mujoco_free.Bodies):
         with warp.ScopedDevice("cpu"), warnings.catch_warnings():
             # that the friction of one geom is less than MuJoCo likes: a pair's counts
             warnings.simplefilter("ignore")
-            self.model, self.data = (
-                engine.put_model(model),
-                engine.put_data(model, data, nconmax=32, njmax=128),
-            )
+            self.model = engine.put_model(model)
+            self.data = engine.put_data(model, data, nconmax=32, njmax=128)
 
     def advance(self) -> None:
         with warp.ScopedDevice("cpu"):

@@ -48,25 +48,22 @@ class Newton(Free):
             self.solver.register_custom_attributes(builder)
         for surface, _, point, normal in self.planes():
             material = rough(surface.friction**2 if rooted else 2 * surface.friction)
-            own = -1
-            at = pose(point, normal)
+            own, at = -1, pose(point, normal)
             if self.goes_along(surface):
                 self.wall = own = builder.add_body(xform=at, mass=1.0, is_kinematic=True)
                 at = warp.transform()
             builder.add_shape_plane(None, body=own, xform=at, width=0.0, length=0.0, cfg=material)
         w, *axis = body.orientation
-        start = warp.transform(body.position, (*axis, w))
-        number = builder.add_body(
-            xform=start, mass=body.mass, inertia=np.diag(body.inertia), lock_inertia=True
+        start, inertia = warp.transform(body.position, (*axis, w)), np.diag(body.inertia)
+        self.number = number = builder.add_body(
+            xform=start, mass=body.mass, inertia=inertia, lock_inertia=True
         )
         if body.shape == "sphere":
             builder.add_shape_sphere(number, radius=body.size[0], cfg=rough(float(rooted)))
         else:
-            builder.add_shape_box(
-                number, hx=body.size[0], hy=body.size[1], hz=body.size[2], cfg=rough(float(rooted))
-            )
+            edges = dict(zip(("hx", "hy", "hz"), body.size, strict=True))
+            builder.add_shape_box(number, **edges, cfg=rough(float(rooted)))
         builder.joint_qd[-6:] = builder.body_qd[number] = [*body.velocity, *body.spin]
-        self.number = number
         if rooted:
             builder.color()
         self.model = builder.finalize(device="cpu")
@@ -81,9 +78,8 @@ class Newton(Free):
         self.old.clear_forces()
 
     def read(self) -> BodyState:
-        place, rate = (
-            each.numpy()[self.number].astype(float) for each in (self.old.body_q, self.old.body_qd)
-        )
+        place = self.old.body_q.numpy()[self.number].astype(float)
+        rate = self.old.body_qd.numpy()[self.number].astype(float)
         return place[:3], rate[:3], rate[3:]
 
     def push(self, force: Vector) -> None:

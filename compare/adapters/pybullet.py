@@ -34,13 +34,12 @@ class PyBullet(Free):
         self.here = here = {"physicsClientId": engine.connect(engine.DIRECT)}
         if here["physicsClientId"] < 0:
             raise RuntimeError("PyBullet has no more servers")
-        engine.setPhysicsEngineParameter(fixedTimeStep=self.timestep, enableConeFriction=1, **here)
+        settings: dict[str, Any] = {"fixedTimeStep": self.timestep, "enableConeFriction": 1}
         # the solver to round-off, no overlap left alone, contacts prepared for from 2 cm on
         if self.best:
-            engine.setPhysicsEngineParameter(
-                numSolverIterations=200, solverResidualThreshold=1e-24, **here
-            )
-            engine.setPhysicsEngineParameter(contactSlop=0.0, contactBreakingThreshold=0.2, **here)
+            settings |= {"numSolverIterations": 200, "solverResidualThreshold": 1e-24}
+            settings |= {"contactSlop": 0.0, "contactBreakingThreshold": 0.2}
+        engine.setPhysicsEngineParameter(**settings, **here)
         engine.setGravity(0, 0, -scene.g * self.scale, **here)
         self.surfaces: dict[int, int] = {}
         for surface, _, point, normal in self.planes():
@@ -48,9 +47,8 @@ class PyBullet(Free):
             # the last one is the one that moves
             self.wall = engine.createMultiBody(0, shape, **here)
             self.surfaces[self.wall] = scene.surfaces.index(surface)
-            engine.changeDynamics(
-                self.wall, -1, lateralFriction=surface.friction, restitution=0, **here
-            )
+            mu = surface.friction
+            engine.changeDynamics(self.wall, -1, lateralFriction=mu, restitution=0, **here)
             # boxes rock on a plane that isn't turned, but has another normal than z
             self.turn(point, normal)
         size = [each * self.scale for each in body.size]
@@ -96,13 +94,11 @@ class PyBullet(Free):
     def touches(self) -> list[Touch]:
         shown = []
         for point in engine.getContactPoints(self.body, **self.here):
-            if point[9] > 0:  # force, direction of the normal; the same of both tangents
-                force = sum(
-                    point[k] * np.array(point[way]) for k, way in ((9, 7), (10, 11), (12, 13))
-                )
-                shown.append(
-                    Touch(self.surfaces[point[2]], force / self.scale, point[8] / self.scale)
-                )
+            if point[9] > 0:
+                # where force and direction of the normal are, then those of both tangents
+                ways = (9, 7), (10, 11), (12, 13)
+                force = sum(point[k] * np.array(point[way]) for k, way in ways) / self.scale
+                shown.append(Touch(self.surfaces[point[2]], force, point[8] / self.scale))
         return shown
 
     def close(self) -> None:

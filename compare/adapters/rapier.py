@@ -50,59 +50,44 @@ class Rapier(Free):
             if self.small > 1:
                 settings.num_internal_pgs_iterations, settings.warmstart_coefficient = 20, 0.0
             settings.length_unit, settings.normalized_max_linear_velocity = 0.01, 1e6
-            settings.contact_softness = settings.static_contact_softness = (
-                engine.SpringCoefficients(200.0, 10.0)
-            )
+            springs = engine.SpringCoefficients(200.0, 10.0)
+            settings.contact_softness = settings.static_contact_softness = springs
         for surface, _, point, normal in self.planes():
             moves = surface.turning or any(surface.velocity) or self.goes_along(surface)
             if self.goes_along(surface):
                 point, normal = np.zeros(3), np.array([-1.0, 0.0, 0.0])
-            kind = (
-                engine.RigidBody.kinematic_velocity_based() if moves else engine.RigidBody.fixed()
-            )
-            shape = engine.Collider.halfspace(normal.tolist()).friction(
-                surface.friction / (scene.between or 1.0)
-            )
+            kinds = engine.RigidBody
+            own = (kinds.kinematic_velocity_based if moves else kinds.fixed)()
+            own = own.translation(point.tolist()).angvel((0.0, 0.0, surface.turning))
+            own = own.linvel(surface.velocity)
+            shape = engine.Collider.halfspace(normal.tolist())
+            shape = shape.friction(surface.friction / (scene.between or 1.0))
             shape = shape.friction_combine_rule(multiply).restitution(surface.restitution)
-            kind = (
-                kind.translation(point.tolist())
-                .angvel((0.0, 0.0, surface.turning))
-                .linvel(surface.velocity)
-            )
-            self.wall = self.world.add_body(kind, [shape])  # the last one is the one that moves
+            self.wall = self.world.add_body(own, [shape])  # the last one is the one that moves
         self.bodies = []
         for body, friction in zip(scene.bodies, (1.0, scene.between), strict=False):
             shapes: list[Any] = []
             for at in body.parts.tolist():
                 if body.shape == "disc":  # its axis is y
-                    shape = engine.Collider.cylinder(*body.size[::-1]).rotation(
-                        (math.pi / 2, 0.0, 0.0)
-                    )
+                    shape = engine.Collider.cylinder(*body.size[::-1])
+                    shape = shape.rotation((math.pi / 2, 0.0, 0.0))
                 elif body.shape == "box":
                     shape = engine.Collider.cuboid(*body.size)
                 else:
                     shape = engine.Collider.ball(body.size[0])
-                shape = (
-                    shape.translation(at)
-                    .density(0.0)
-                    .friction(friction)
-                    .friction_combine_rule(multiply)
-                )
+                shape = shape.translation(at).density(0.0)
+                shape = shape.friction(friction).friction_combine_rule(multiply)
                 shapes.append(shape.restitution(1.0).restitution_combine_rule(multiply))
             start = engine.Isometry3(body.position, engine.Quaternion(*body.orientation))
-            moving = (
-                engine.RigidBody.dynamic().position(start).linvel(body.velocity).angvel(body.spin)
-            )
-            moving = moving.additional_mass_properties(
-                engine.MassProperties((0, 0, 0), body.mass, body.inertia)
-            )
-            self.bodies.append(self.world.add_body(moving, shapes))
+            mass = engine.MassProperties((0, 0, 0), body.mass, body.inertia)
+            own = engine.RigidBody.dynamic().position(start).additional_mass_properties(mass)
+            own = own.linvel(body.velocity).angvel(body.spin)
+            self.bodies.append(self.world.add_body(own, shapes))
 
     def read(self) -> BodyState:
-        own = [self.world.rigid_bodies[body] for body in self.bodies]
-        return tuple(
-            [v.x, v.y, v.z] for body in own for v in (body.translation, body.linvel, body.angvel)
-        )
+        own = (self.world.rigid_bodies[body] for body in self.bodies)
+        parts = (v for body in own for v in (body.translation, body.linvel, body.angvel))
+        return tuple([v.x, v.y, v.z] for v in parts)
 
     def push(self, force: Vector) -> None:
         body = self.world.rigid_bodies[self.bodies[0]]

@@ -51,14 +51,10 @@ class Sapien(Free):
             self.wall = self.add(own, pose(point, normal), 2 * surface.friction, size)
             self.face = own
         self.body = physx.PhysxRigidDynamicComponent()
-        self.entity = self.add(
-            self.body, engine.Pose(body.position, body.orientation), 0.0, body.size
-        )
-        self.body.mass, self.body.inertia, self.body.cmass_local_pose = (
-            body.mass,
-            body.inertia,
-            engine.Pose(),
-        )
+        start = engine.Pose(body.position, body.orientation)
+        self.entity = self.add(self.body, start, 0.0, body.size)
+        self.body.mass, self.body.inertia = body.mass, body.inertia
+        self.body.cmass_local_pose = engine.Pose()
         self.body.linear_damping = self.body.angular_damping = 0.0
         if self.best:
             self.body.max_angular_velocity = 1e6
@@ -67,15 +63,13 @@ class Sapien(Free):
 
     def add(self, component: Any, pose: Any, friction: float, size: tuple[float, ...] = ()) -> Any:
         """Attach a plane, sphere or box with a friction: its size has 0, 1 or 3 numbers."""
-        kinds = {
-            0: physx.PhysxCollisionShapePlane,
-            1: physx.PhysxCollisionShapeSphere,
-            3: physx.PhysxCollisionShapeBox,
-        }
         material = physx.PhysxMaterial(friction, friction, 0.0)
-        component.attach(
-            kinds[len(size)](*(size if len(size) == 1 else [size] * bool(size)), material)
-        )
+        if not size:
+            component.attach(physx.PhysxCollisionShapePlane(material))
+        elif len(size) == 1:
+            component.attach(physx.PhysxCollisionShapeSphere(*size, material))
+        else:
+            component.attach(physx.PhysxCollisionShapeBox(size, material))
         entity = engine.Entity()
         entity.add_component(component)
         entity.set_pose(pose)

@@ -84,13 +84,12 @@ class Body:
     def after(self, time: float) -> Body:
         """The body that has moved on freely by a short time, s."""
         spin, rate = np.array(self.spin), math.hypot(*self.spin)
-        turn = np.append(
-            math.cos(rate * time / 2), spin / max(rate, 1e-300) * math.sin(rate * time / 2)
-        )
+        half = rate * time / 2
+        cos, turn = math.cos(half), spin / max(rate, 1e-300) * math.sin(half)
         w, *axis = self.orientation
-        ours = turn[0] * np.array(axis) + w * turn[1:] + np.cross(turn[1:], axis)
+        ours = cos * np.array(axis) + w * turn + np.cross(turn, axis)
         place = np.array(self.position) + time * np.array(self.velocity)
-        orientation = (float(turn[0] * w - turn[1:] @ axis), *ours.tolist())
+        orientation = (float(cos * w - turn @ axis), *ours.tolist())
         return replace(self, position=(*place.tolist(),), orientation=orientation)
 
 
@@ -172,16 +171,16 @@ class Scene:
     def mjcf(self, timestep: float = 1e-3) -> str:
         """The scene for MuJoCo, as it comes; it lacks `force` and restitution."""
         named = reversed([*zip(("body", "under"), self.bodies, strict=False)])
-        bodies, starts = zip(*(self._body_mjcf(name, body) for name, body in named), strict=True)
+        bodies, *start = zip(*(self._body_mjcf(name, body) for name, body in named), strict=True)
         parts = "\n    ".join([*self._surfaces_mjcf(), *bodies])
-        qpos, qvel = (itertools.chain(*each) for each in zip(*starts, strict=True))
+        qpos, qvel = (_text(itertools.chain(*each)) for each in start)
         return f"""<mujoco model="{self.name}">
   <option timestep="{timestep}" gravity="0 0 {-self.g}"/>
   <worldbody>
     {parts}
   </worldbody>
   <contact>{"".join(self._pairs_mjcf())}</contact>
-  <keyframe><key name="start" qpos="{_text(qpos)}" qvel="{_text(qvel)}"/></keyframe>
+  <keyframe><key name="start" qpos="{qpos}" qvel="{qvel}"/></keyframe>
 </mujoco>
 """
 
@@ -197,15 +196,15 @@ class Scene:
                 f'quat="{_text(turn)}" {belt}friction="{surface.friction} 0 0"/>'
             )
 
-    def _body_mjcf(self, name: str, body: Body) -> tuple[str, tuple[list[float], list[float]]]:
+    def _body_mjcf(self, name: str, body: Body) -> tuple[str, list[float], list[float]]:
         """A body as an element of MJCF; its coordinates and velocities at the start."""
         joint, shape = "<freejoint/>", {"tripod": "sphere", "disc": "cylinder"}.get(body.shape)
         # MuJoCo counts the spin of a free body in its own axes.
         spin = in_body_axes(body.orientation, body.spin)
-        start = [*body.position, *body.orientation], [*body.velocity, *spin]
+        qpos, qvel = [*body.position, *body.orientation], [*body.velocity, *spin]
         if self.joint:
             joint = f'<joint type="slide" axis="{_text(self.joint)}" frictionloss="{self.dry}"/>'
-            start = [0.0], [float(np.dot(self.joint, body.velocity))]
+            qpos, qvel = [0.0], [float(np.dot(self.joint, body.velocity))]
         size = body.size[:1] if body.shape == "tripod" else body.size
         look = f'type="{shape or body.shape}" size="{_text(size)}"'
         geoms = [
@@ -213,23 +212,21 @@ class Scene:
             for k, at in enumerate(body.parts)
         ]
         at = f'pos="{_text(body.position)}" quat="{_text(body.orientation)}"'
-        text = f"""<body name="{name}" {at}>
+        element = f"""<body name="{name}" {at}>
       {joint}
       <inertial pos="0 0 0" mass="{body.mass}" diaginertia="{_text(body.inertia)}"/>
       {_INDENT.join(geoms)}
     </body>"""
-        return text, start
+        return element, qpos, qvel
 
     def _pairs_mjcf(self) -> Iterator[str]:
         """Contact pairs whose friction isn't that of a surface, as elements of MJCF."""
         lowest = ("body", "under")[len(self.bodies) - 1]
         frictions = [("under", "body", self.between, self.between)] if self.under else []
         # The engine's first direction on a level plane is y, its second one x.
-        frictions += [
-            (surface.name, lowest, surface.across, surface.friction)
-            for surface in self.surfaces
-            if surface.across
-        ]
+        for surface in self.surfaces:
+            if surface.across:
+                frictions.append((surface.name, lowest, surface.across, surface.friction))
         for one, other, first, second in frictions:
             yield f'<pair geom1="{one}" geom2="{other}" friction="{first} {second} 0 0 0"/>'
 

@@ -31,15 +31,8 @@ from model.versions import ABSENT
 PROGRAM = Path(__file__).with_name("_siconos_worker.py")
 PATIENCE = 60.0
 """For how long, s, an answer is waited for."""
-
-
-SETTINGS = {
-    "theta": 0.5,
-    "activation": 1e-9,
-    "projection": 1e-12,
-    "newton": 1e-15,
-    "tolerance": 1e-14,
-}
+SETTINGS = {"theta": 0.5, "activation": 1e-9, "projection": 1e-12}
+SETTINGS |= {"newton": 1e-15, "tolerance": 1e-14}
 """theta of `MoreauJeanDirectProjectionOSI`, the share of forces that is taken at the end of a step;
 `ConstraintActivationThreshold`, m: a contact counts as closed if half a step further its gap is
 less than that, and at zero a resting contact that is open by round-off is left open, so that the
@@ -115,20 +108,15 @@ class Siconos(Free):
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
-            env=os.environ
-            | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},  # matrices are of six rows
+            # matrices are of six rows
+            env=os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
             start_new_session=True,  # Ctrl-C is for us
         )
-        numbers: dict[str, float | None] = {
-            "m": body.mass,
-            "r": body.size[0],
-            "inertia": body.inertia[0],
-            "g": scene.g,
-        }
-        numbers |= {"R": wall.radius - body.size[0], "eta": wall.friction}
-        numbers["mu"] = floors[0].friction if floors else None
+        r, mu = body.size[0], floors[0].friction if floors else None
+        problem: dict[str, Any] = {"m": body.mass, "r": r, "inertia": body.inertia[0], "g": scene.g}
+        problem |= {"R": wall.radius - r, "mu": mu, "eta": wall.friction}
         try:
-            self._ask({**SETTINGS, **numbers, "timestep": self.timestep})
+            self._ask({**SETTINGS, **problem, "timestep": self.timestep})
             self._ask([*body.position, *body.velocity, *body.spin])
         except BreakdownError as error:
             self.close()
@@ -149,9 +137,8 @@ class Siconos(Free):
         if not line:
             assert self._process.stderr
             words = self._process.stderr.read().strip().splitlines()
-            raise BreakdownError(
-                f"ended ({words[-1] if words else f'exit code {self._process.wait()}'})"
-            )
+            why = words[-1] if words else f"exit code {self._process.wait()}"
+            raise BreakdownError(f"ended ({why})")
         answer = json.loads(line)
         if isinstance(answer, dict):
             raise BreakdownError(f"could not go on ({answer['error']})")
