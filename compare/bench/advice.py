@@ -16,6 +16,7 @@ import numpy as np
 from compare.bench.contact_law import Array, SoftContacts, geom_names, parameters
 from compare.bench.settled import Rest
 from mjsim import Coulomb
+from model.errors import few
 
 UNNAMED = {"solref": (0.02, 1.0), "solimp": (0.9, 0.95)}
 """MuJoCo's own values, which a geom has that says nothing of its own."""
@@ -42,10 +43,8 @@ class Change:
     before: float
     after: float
     """Predicted."""
-    geoms: tuple[str, ...]
-    """Of those that touch, the ones to be changed."""
     own: tuple[str, ...] = ()
-    """Of all that are to be changed, those with a value of their own, which no default reaches."""
+    """Geoms to be changed that have a value of their own, which no default reaches."""
     found: float = math.nan
     """Measured, if it was tried."""
 
@@ -63,9 +62,8 @@ class Change:
         default = f"<default><geom {self.written}/><pair {self.written}/></default>"
         if not self.own:
             return default
-        more = f" and {len(self.own) - MENTIONED} more" if len(self.own) > MENTIONED else ""
-        names = ", ".join(self.own[:MENTIONED]).replace("--", "- -")
-        return f"{default}\n<!-- and where it is set now, at {names}{more} -->"
+        names = few(self.own, MENTIONED).replace("--", "- -")
+        return f"{default}\n<!-- and where it is set now, at {names} -->"
 
 
 def remedy_code(model: Any) -> str:
@@ -121,7 +119,7 @@ class AtRest:
     found: Mapping[str, Array]
     creep: float
     """What passes for good, m/s."""
-    depth: Array
+    depth: Array | float
     """What passes for good, of each, m."""
 
     @np.errstate(over="ignore")
@@ -153,7 +151,7 @@ def best_change(
     its own; `calm` says whether a changed model settles as well; `tell` is called with the
     fraction of options that were tried."""
     c, what, tried = scene.contacts, max(harm, key=lambda fault: harm[fault]), []
-    part, names = np.isin(np.arange(len(scene.number)), members), geom_names(scene.model)
+    part = np.isin(np.arange(len(scene.number)), members)
     now = _worst(c, part, what)
     options = list(_options(c.subset(part))) if harm[what] > 1 else []
     for k, (option, value) in enumerate(options):
@@ -164,11 +162,8 @@ def best_change(
         changed = dataclasses.replace(c, **parameters(other, state, scene.number))
         harms, then = scene.harm(changed), _worst(changed, part, what)
         left = max(float(each.max()) for each in harms.values())
-        softness = [(model.geom_solref, model.geom_solimp) for model in (scene.model, other)]
-        differ = np.any([(old != new).any(1) for old, new in zip(*softness, strict=True)], axis=0)
-        geoms = tuple(names[g] for g in np.unique(c.geoms) if differ[g])
-        own = tuple(names[g] for g in _with_own_values(scene.model, option) if differ[g])
-        tried.append((left, harms, Change(option, value, pair, what, now, then, geoms, own), other))
+        own = tuple(_changed_by_name(scene.model, other, option))
+        tried.append((left, harms, Change(option, value, pair, what, now, then, own), other))
     cures = [each for each in tried if each[0] <= 1]
     helps = [each for each in tried if 1 < each[0] < harm[what] / 1.4]
     helps.sort(key=lambda each: (each[0], max(1, float(each[1][what].max()))))
@@ -178,12 +173,12 @@ def best_change(
     return None, scene.harm(c)
 
 
-def _with_own_values(model: Any, option: str) -> list[int]:
-    """Geoms that name an option of softness themselves, or by their class."""
-    if option not in UNNAMED:
-        return []
-    values = getattr(model, f"geom_{option}")[:, :2]
-    return [int(geom) for geom in np.flatnonzero((values != UNNAMED[option]).any(1))]
+def _changed_by_name(model: Any, changed: Any, option: str) -> Iterator[str]:
+    """Geoms that name an option of softness themselves, or by their class, and have it changed."""
+    if option in UNNAMED:
+        now, then = (getattr(each, f"geom_{option}") for each in (model, changed))
+        named = (now[:, :2] != UNNAMED[option]).any(1) & (now != then).any(1)
+        yield from itertools.compress(geom_names(model), named)
 
 
 def _options(c: SoftContacts) -> Iterator[tuple[str, tuple[float, ...]]]:

@@ -105,8 +105,8 @@ class Forecast:
     settled: Rest
     flexible: int
     """Contacts of flexible bodies, which are left out."""
-    change: advice.Change | None
-    remedy: str
+    change: advice.Change | None = None
+    remedy: str = ""
     """Lines of Python that hold what still creeps harmfully; empty: nothing does."""
 
     @property
@@ -229,9 +229,8 @@ def _measured(
             those.force[part, 0] *= load
             those.force[part, 1:] *= friction / sideways if sideways > 1e-9 * then[0] else load
             found["depth_measured"][part] = mean[1] / max(mean[2], 1e-300)
-    deep = np.full(len(number), tolerances.depth) if tolerances.depth else DEPTH * radius
     own = those.subset(np.ones(len(number), bool))
-    good = tolerances.creep, deep
+    good = tolerances.creep, tolerances.depth or DEPTH * radius
     return advice.AtRest(model, start, settled, own, number, radius, moves, found, *good)
 
 
@@ -269,7 +268,7 @@ def _without_advice(scene: advice.AtRest) -> Forecast:
     alone = min(pair.largest_step for pair in pairs)
     largest = min(alone, those.largest_step(min(alone, LARGEST)))
     step, flexible = scene.model.opt.timestep, _count_flexible(scene.data)
-    return Forecast(tuple(pairs), step, largest, scene.settled, flexible, None, "")
+    return Forecast(tuple(pairs), step, largest, scene.settled, flexible)
 
 
 def _count_flexible(data: Any) -> int:
