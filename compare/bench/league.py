@@ -87,19 +87,17 @@ def summary(league: Mapping[str, Sequence[Result]]) -> Rows:
     table = [["engine", "precision", "passed", *KINDS, "order", "cost"]]
     for name, results in ranked(league).items():
         own = [result for result in results if not result.skipped]
-        errors: dict[str, list[float]] = {kind: [] for kind in KINDS}
-        for result in own:
-            lost = not math.isfinite(result.error)
-            errors[kinds[result.case]].append(math.inf if lost else result.error)
+        precision, passed = own[0].engine.precision, sum(r.passed for r in own)
+        medians = []
+        for kind in KINDS:
+            errors = (r.error for r in own if kinds[r.case] == kind)
+            median = _median(e if math.isfinite(e) else math.inf for e in errors)
+            medians.append(number(median, FLOORS[precision]))
         order = _median(r.order for r in own if math.isfinite(r.order))
         cost = _median(r.cost for r in own if math.isfinite(r.cost))
-        precision, passed = own[0].engine.precision, sum(r.passed for r in own)
-        medians = [number(_median(errors[kind]), FLOORS[precision]) for kind in KINDS]
-        shown = (
-            "" if math.isnan(order) else f"{order:.1f}",
-            "" if math.isnan(cost) else f"{cost:.2g}",
-        )
-        table.append([name, precision, f"{passed} of {len(own)}", *medians, *shown])
+        shown = [name, precision, f"{passed} of {len(own)}", *medians]
+        shown.append("" if math.isnan(order) else f"{order:.1f}")
+        table.append([*shown, "" if math.isnan(cost) else f"{cost:.2g}"])
     return table
 
 
@@ -118,9 +116,10 @@ def caption(league: Mapping[str, Sequence[Result]]) -> str:
     for name, results in ranked(league).items():
         for step in {result.steps[-1] for result in results if result.steps}:
             engines.setdefault(step, []).append(name)
-    steps = [f"{1e3 * step:g} ms ({', '.join(names)})" for step, names in sorted(engines.items())]
-    if len(steps) == 1:
-        steps = [steps[0].partition(" (")[0]]
+    steps = [
+        f"{1e3 * step:g} ms" + (f" ({', '.join(names)})" if len(engines) > 1 else "")
+        for step, names in sorted(engines.items())
+    ]
     law = f" {_UNDER_THE_LAW}" if "mujoco" in league else ""
     return (
         "Errors at the shortest step in units of each case's scales; up to "
@@ -133,13 +132,13 @@ def caption(league: Mapping[str, Sequence[Result]]) -> str:
 
 def ranked(league: Mapping[str, Sequence[Result]]) -> dict[str, Sequence[Result]]:
     """Engines that were tried; the best first, as they come behind all others."""
-    tried = {
-        name: [result.passed for result in results if not result.skipped]
-        for name, results in league.items()
-    }
-    there = [name for name, own in tried.items() if own]
-    there.sort(key=lambda name: (name.endswith("-defaults"), -statistics.mean(tried[name])))
-    return {name: league[name] for name in there}
+
+    def place(name: str) -> tuple[bool, float]:
+        passed = statistics.mean(r.passed for r in league[name] if not r.skipped)
+        return name.endswith("-defaults"), -passed
+
+    tried = [name for name, results in league.items() if any(not r.skipped for r in results)]
+    return {name: league[name] for name in sorted(tried, key=place)}
 
 
 def cell(result: Result) -> str:

@@ -52,6 +52,9 @@ LIFTED = 1e-3
 FLOORS = {"f64": 1e-11, "f32": 1e-5}
 """Errors that are only round-off; there is no order in them."""
 FUNCTIONS = ("build", "step", "state")
+TOLD = {"precision": "PRECISION", "declared": "DECLARED", "note": "NOTE", "steps": "TIMESTEPS"}
+TOLD |= {"features": "FEATURES", "missing": "MISSING"}
+"""Where an engine has what it may say of itself, by fields of `About`."""
 
 
 @dataclass(frozen=True)
@@ -124,15 +127,17 @@ def run(
     used, or for a step that is none."""
     for step in steps or ():
         check_number("step", step, "s", POSITIVE)
-    with closing(EngineProcess(engine, limit)) as trial:
-        trial.check()
-        return trial.result(case, steps)
+    (found,) = run_all([case], engine, steps, limit)
+    if found.engine.missing:
+        raise InputError(found.engine.missing)
+    return found
 
 
 def check(engine: Any) -> None:
     """`InputError` if an engine can't be used here."""
     with closing(EngineProcess(engine)) as trial:
-        trial.check()
+        if trial.about.missing:
+            raise InputError(trial.about.missing)
 
 
 def run_all(
@@ -174,11 +179,6 @@ class EngineProcess:
         answer = self._answer(BEGIN)
         name = self._engine if isinstance(self._engine, str) else type(self._engine).__name__
         return answer if isinstance(answer, About) else About(name, missing=f"{name} {answer}")
-
-    def check(self) -> None:
-        """`InputError` if the engine can't be used here."""
-        if self.about.missing:
-            raise InputError(self.about.missing)
 
     def _answer(self, limit: float) -> Any:
         """What the process sends within `limit` s, or in words why it doesn't."""
@@ -225,16 +225,16 @@ class EngineProcess:
             found = replace(found, failure=f"{found.failure} ({about.version})")
         errors = tuple(math.nan if each is None else case.error(each) for each in states)
         found = replace(found, errors=errors)
-        if (last := states[-1]) is None:
+        if states[-1] is None:
             return found
-        gaps, slips = case.touching(last)
-        sticks, touches = case.in_contact("R"), case.in_contact("RS")
-        if sticks.any():
-            found = replace(found, creep=float(slips[sticks].mean()))
-        if touches.any():
-            lifted = gaps[touches] > LIFTED * min(case.body.size)
-            found = replace(found, lost=float(lifted.mean()))
-        return found
+        gaps, slips = case.touching(states[-1])
+        slips, gaps = slips[case.in_contact("R")], gaps[case.in_contact("RS")]
+        lifted = gaps > LIFTED * min(case.body.size)
+        return replace(
+            found,
+            creep=float(slips.mean()) if slips.size else math.nan,
+            lost=float(lifted.mean()) if gaps.size else math.nan,
+        )
 
 
 def _load(given: Any) -> tuple[Any, About]:
@@ -259,27 +259,19 @@ def _load(given: Any) -> tuple[Any, About]:
         raise InputError(
             f"{name} has no function {' nor '.join(lacking)}; an engine has {', '.join(FUNCTIONS)}"
         )
-    check_choice("PRECISION", precision := getattr(engine, "PRECISION", "f64"), list(FLOORS))
-    declared, note, features = (
-        getattr(engine, what, "") for what in ("DECLARED", "NOTE", "FEATURES")
-    )
-    steps = (
-        check_number("TIMESTEPS", step, "s", POSITIVE)
-        for step in getattr(engine, "TIMESTEPS", TIME_STEPS)
-    )
-    about = About(
-        name, precision, declared, note, _version(given, engine), tuple(steps), tuple(features)
-    )
-    return engine, replace(about, missing=getattr(engine, "MISSING", ""))
+    told = {what: getattr(engine, name) for what, name in TOLD.items() if hasattr(engine, name)}
+    about = About(name, version=_version(given, engine), **told)
+    check_choice("PRECISION", about.precision, list(FLOORS))
+    steps = tuple(check_number("TIMESTEPS", step, "s", POSITIVE) for step in about.steps)
+    return engine, replace(about, steps=steps, features=tuple(about.features))
 
 
 def _version(given: Any, engine: Any) -> str:
     """The version of an engine's package, and that with which it is known to work."""
     package, _, known = _package(given, engine).partition(" ")
     here = version(package) if package else ""
-    return f"{package} {here}".strip() + (
-        f", known to work: {known}" if known and here != known else ""
-    )
+    other = f", known to work: {known}" if known and here != known else ""
+    return f"{package} {here}".strip() + other
 
 
 def _package(given: Any, engine: Any) -> str:
@@ -331,14 +323,11 @@ def _attempt(engine: Any, case: ContactCase, step: float) -> Any:
                 found = engine.state()
                 parts = [] if found is None else [np.array(part, dtype=float) for part in found]
                 spent, done = spent + time.process_time() - begin, at
-                shapes, count = [part.shape for part in parts], len(case.bodies)
-                if shapes != [(3,)] * 3 * count:
-                    of = "" if count == 1 else " of both bodies"
-                    return (
-                        None,
-                        math.nan,
-                        f"state() must return position, velocity and spin{of}, not shapes {shapes}",
-                    )
+                shapes = [part.shape for part in parts]
+                if shapes != [(3,)] * 3 * len(case.bodies):
+                    of = " of both bodies" if case.under else ""
+                    why = f"must return position, velocity and spin{of}, not shapes {shapes}"
+                    return None, math.nan, f"state() {why}"
                 now = np.concatenate(parts)
                 if not (np.abs(now) < 1e8).all():
                     return None, math.nan, f"diverged by t = {t:g} s at a step of {1e3 * step:g} ms"

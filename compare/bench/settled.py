@@ -28,7 +28,7 @@ STEADY, STILL = 2e-3, 1e-8
 """A speed that changes by no more than this share, or this (m/s), in a window has settled."""
 MOST_POINTS = 25_000_000
 """Of a heightfield or texture: 5000 by 5000, some 200 MB while it is compiled."""
-FIELDS = {"hfield": ("heightfield", "nrow", "ncol"), "texture": ("texture", "width", "height")}
+_FIELDS = {"hfield": ("heightfield", "nrow", "ncol"), "texture": ("texture", "width", "height")}
 """Elements of MJCF that have so many points: their names, and attributes with rows and columns."""
 NOISE = 1e-6
 """Speeds that are not told apart, m/s."""
@@ -100,7 +100,7 @@ def _check_sizes(path: Path) -> None:
     except (ElementTree.ParseError, LookupError, ValueError):
         return  # MuJoCo says what is wrong
     for each in elements:
-        what, *names = FIELDS.get(each.tag, ("",))
+        what, *names = _FIELDS.get(each.tag, ("",))
         sizes = [each.get(name, "") for name in names]
         if all(map(str.isdecimal, sizes)) and math.prod(map(int, sizes)) > MOST_POINTS:
             raise InputError(
