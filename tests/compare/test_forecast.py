@@ -367,7 +367,9 @@ REFUSED = {
         2,
         "scene.xml: heightfield 'h' has 5001 x 5000 points; 2.5e.07 are the most",
     ),
-    mjcf(LEVEL, rest='<asset><texture name="t" builtin="flat" width="6000" height="6000"/></asset>'): (
+    mjcf(
+        LEVEL, rest='<asset><texture name="t" builtin="flat" width="6000" height="6000"/></asset>'
+    ): (
         2,
         "scene.xml: texture 't' has 6000 x 6000 points",
     ),
