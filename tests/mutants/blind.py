@@ -31,11 +31,13 @@ from compare.kit import pages
 from compare.kit.campaign import Campaign
 from compare.kit.engines import ENGINES, MUJOCO, PLAIN, Engine
 from compare.kit.levels import HIGH, LOW, Level
+from compare.kit.pages import Rows
 from compare.kit.progress import ValidationProgress, show_nothing
 from compare.kit.record import RecordsByEngine
 from compare.kit.workers import LateError, at_most
 from compare.report.deviations import distribution
 from compare.report.results import RUNS
+from docs.studies import tables
 from model import Parameters
 from model.files import make_directory, write_text
 from model.versions import current_commit
@@ -249,12 +251,28 @@ Measured by {", ".join(names)}; not installed: {absent or "none"}.
 """
 
 
+def rounds(page: str) -> Rows:
+    """What became of the faults of all rounds on the page, by MuJoCo under the law."""
+    table = [["seed", "faults that change something", "found", "break down", "go unseen"]]
+    for one in page.split("\n## Seed ")[1:]:
+        faults = [row.split(" | ") for row in one.splitlines() if row.startswith("| `")]
+        live = [row for row in faults if "changes no prediction" not in row[-1]]
+        found = sum(row[1] != "–" for row in live)
+        broke = sum(row[1] == "–" and "breaks down" in row[-1] for row in live)
+        table.append([one.split("\n")[0], *map(str, (len(live), found, broke)), ""])
+        table[-1][-1] = str(len(live) - found - broke)
+    sums = [str(sum(int(row[k]) for row in table[1:])) for k in range(1, 5)]
+    return [*table, ["all", *sums]]
+
+
 def main(seed: str, directory: str = "results/blind") -> None:
     """Play a round, and add its section to the page."""
     before = PAGE.read_text("utf-8")
     if f"## Seed {seed}\n" in before:
         sys.exit(f"seed {seed} was played already: {PAGE}")
-    write_text(PAGE, before + play(int(seed), Path(directory) / seed))
+    page = before + play(int(seed), Path(directory) / seed)
+    write_text(PAGE, page)
+    tables.write(PAGE, "rounds", rounds(page))
 
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ import analytic
 from analytic.stationary import solutions as stationary
 from compare.adapters.free import Library
 from compare.claim import Outcome
+from compare.kit import pages
 from compare.kit.campaign import Campaign
 from compare.kit.engines import ENGINES, MUJOCO
 from compare.kit.levels import Level
@@ -134,6 +135,14 @@ def test_a_round_is_played_by_a_seed(tmp_path, monkeypatch):
     assert "| siconos | " in said
     assert "Measured by mujoco, siconos; not installed: drake." in said
     assert " | none | " in said  # false alarms
+
+
+def test_the_page_of_blind_rounds_counts_its_rows():
+    page = blind.PAGE.read_text("utf-8")
+    table = blind.rounds(page)
+    assert pages.markdown(table) in page
+    assert len(table) == page.count("\n## Seed ") + 2
+    assert blind.rounds("\n## Seed 7\n\n| `a → b` | – | x |  |\n")[1] == ["7", "1", "0", "0", "1"]
 
 
 def _formula(p):
