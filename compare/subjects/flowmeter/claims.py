@@ -36,10 +36,10 @@ RTOL = 1e-9
 
 def _slope(
     by: str, predict: Callable[[Measurement], float], function: str, *cases: Case
-) -> tuple[Criterion]:
+) -> Criterion:
     """A criterion on slopes of the curve measured in one way, in some cases."""
     when = all_of(given(by=by), is_in(*cases))
-    return (Criterion("slope", "slope", predict, when=when, by=f"analytic.{function}"),)
+    return Criterion("slope", "slope", predict, when=when, by=f"analytic.{function}")
 
 
 def _slope_at(m: Measurement) -> float:
@@ -121,30 +121,26 @@ def _end_case(m: Measurement) -> Case:
 
 def _at_event(m: Measurement) -> Estimate:
     """A number at an event of theory's motion; LookupError if there is no such event."""
-    run, events, event, unsure = _simulated(m), _simulated(m).events, m.at["event"], 0.0
-    changes = list(zip(map(Case, events.from_case), map(Case, events.to_case), strict=True))
+    run, event = _simulated(m), m.at["event"]
     if m.quantity == "lift":
         top = Estimate(float(run.y[-1]), 0.0) if event == "end" else first_top(run)
-        value, unsure = top.value, top.uncertainty
-    else:
-        slips = [after.B is Contact.S for _, after in changes]
-        lands = [before.A is Contact.N and after.A is not Contact.N for before, after in changes]
-        happens = slips if event == "slip at B" else lands
-        if not any(happens):
-            raise LookupError("theory has no such event")
-        time = events.time[happens.index(True)]
-        # One landing may be several events at one time; the vertical impulse is that of all of
-        # them, at both contacts.
-        now = np.isclose(events.time, time, rtol=0.0, atol=math.ulp(1.0) * 1e3)
-        impulse = float((events.impulse_A[now, 1] + events.impulse_B[now, 1]).sum())
-        # A landing without restitution takes away all of the speed.
-        values = {
-            "time": float(time),
-            "landing_impulse": impulse,
-            "landing_speed": -impulse / m.parameters.m,
-        }
-        value = values[m.quantity]
-    return integrated(value, value, RTOL).also(reading=unsure)
+        return integrated(top.value, top.value, RTOL).also(reading=top.uncertainty)
+    events = run.events
+    changes = list(zip(map(Case, events.from_case), map(Case, events.to_case), strict=True))
+    slips = [after.B is Contact.S for _, after in changes]
+    lands = [before.A is Contact.N and after.A is not Contact.N for before, after in changes]
+    happens = slips if event == "slip at B" else lands
+    if not any(happens):
+        raise LookupError("theory has no such event")
+    time = float(events.time[happens.index(True)])
+    # One landing may be several events at one time; the vertical impulse is that of all of them, at
+    # both contacts.
+    now = np.isclose(events.time, time, rtol=0.0, atol=math.ulp(1.0) * 1e3)
+    impulse = float((events.impulse_A[now, 1] + events.impulse_B[now, 1]).sum())
+    # A landing without restitution takes away all of the speed.
+    speed = -impulse / m.parameters.m
+    value = {"time": time, "landing_impulse": impulse, "landing_speed": speed}[m.quantity]
+    return integrated(value, value, RTOL)
 
 
 OFF = 0.05
@@ -178,9 +174,8 @@ def _exact(m: Measurement) -> float:
 def _worst(m: Measurement) -> float:
     """The flow up to which a design covers a meter of nominal friction, at worst."""
     nominal = _nominal_friction(m, OFF)
-    return design.choice(
-        m.parameters.replace, nominal, dict.fromkeys(nominal, OFF), fastest=1.0
-    ).margin
+    tolerances = dict.fromkeys(nominal, OFF)
+    return design.choice(m.parameters.replace, nominal, tolerances, fastest=1.0).margin
 
 
 def _end_of_spread(m: Measurement, end: int) -> float:
@@ -215,28 +210,28 @@ CLAIMS = (
         "Section 5.3",
         "Rolling at both points, or carried by the wall alone, the ball reads the flow: dω_c/dω₀ = "
         "1.",
-        *_slope("neighbours", _slope_at, "characteristic_slope", Case.RR, Case.NR),
+        _slope("neighbours", _slope_at, "characteristic_slope", Case.RR, Case.NR),
     ),
     claim(
         "slope-slipping",
         "Section 5.3, (38), (41)",
         "While the ball slips at both points its reading rises by (38), (41), at first hardly at "
         "all.",
-        *_slope("neighbours", _slope_at, "characteristic_slope", Case.SS),
+        _slope("neighbours", _slope_at, "characteristic_slope", Case.SS),
     ),
     claim(
         "slope-jump",
         "Section 5.3",
         "At ω₀₁ the slope of the characteristic curve jumps: from 1 to 0, as the equations have "
         "it.",
-        *_slope("jump", lambda m: analytic.slope_jump(m.parameters), "slope_jump", Case.SS),
+        _slope("jump", lambda m: analytic.slope_jump(m.parameters), "slope_jump", Case.SS),
     ),
     claim(
         "slope-mean",
         "Section 5.3",
         "Between ω₀₁ and ω₀₂ the characteristic curve has a small mean slope: a few hundredths for "
         "the reference.",
-        *_slope("mean", lambda m: analytic.mean_slope(m.parameters), "mean_slope", Case.SS),
+        _slope("mean", lambda m: analytic.mean_slope(m.parameters), "mean_slope", Case.SS),
     ),
     claim(
         "operating-range",

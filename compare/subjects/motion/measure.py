@@ -34,7 +34,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -44,7 +44,7 @@ from compare.kit.programme import Protocol
 from compare.kit.record import Measured, Missing, Records, Sets
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
-from compare.kit.settling import PRESSES, settled_readings
+from compare.kit.settling import PRESSES, forces, settled_readings
 from compare.kit.statistics import Estimate, estimate, uniform
 from compare.kit.step_pairs import (
     HALF_WINDOW,
@@ -240,11 +240,7 @@ slip is about to vanish, or very small, friction turns too fast."""
 
 
 MOVING = {
-    case: [
-        k
-        for k, name in enumerate(VARIABLES)
-        if name in TRAITS[case].active and name not in ("y", "h")
-    ]
+    case: [k for k, name in enumerate(VARIABLES) if name in {*TRAITS[case].active} - {"y", "h"}]
     for case in Case
 }
 """The variables whose rates of change are measured."""
@@ -288,7 +284,7 @@ def field(runner: Runner, sets: Sets, records: Records) -> Measured:
         if lacking := runner.sampling.field_kept - kept[name, sets[name].nu_f, case]:
             why = f"too few random starts moved smoothly in case {case.name} for "
             why += f"{2 * HALF_WINDOW} steps"
-            rows = len(MOVING[case]) + len(_forces(case, np.zeros(6)))
+            rows = len(MOVING[case]) + len(_determined(case))
             yield runner.missing(name, why, lacking * rows)
 
 
@@ -311,23 +307,18 @@ def _values(
         time, at = run.time[window], float(run.time[middle])
         # The forces of a sample act from then on for a step: they belong to the middle of it.
         acting = time + (time[1] - time[0]) / runner.divisor / 2
-        forces = polynomials(
-            acting, np.concatenate([run.force_A, run.force_B], axis=1)[window], FIELD_DEGREES, at
-        )[0]
-        read.append(
-            np.concatenate([*polynomials(time, run.x[window], FIELD_DEGREES, at), forces], axis=1)
-        )
+        both = np.concatenate([run.force_A, run.force_B], axis=1)[window]
+        loads, _ = polynomials(acting, both, FIELD_DEGREES, at)
+        motion = polynomials(time, run.x[window], FIELD_DEGREES, at)
+        read.append(np.concatenate([*motion, loads], axis=1))
     # (3, 22) of each degree: state, rates, forces at A and B
     (limit, other), (lower, _) = (of_three_steps(of) for of in np.stack(read, axis=1))
     rows = np.stack([limit, other, lower])
     speed, spin, weight = math.sqrt(p.g * p.R), p.g / p.r, p.m * p.g
     scales = np.array([speed, p.g, p.g / p.R, spin, spin, spin, speed, p.g])
-    moving, held = MOVING[case], [_forces(case, row) for row in rows[:, 16:]]
-    read_off = {f"rate_{VARIABLES[k]}": (rows[:, 8 + k], float(scales[k])) for k in moving}
-    read_off |= {
-        f"moving_force_{name}": (np.array([each[name] for each in held]), weight)
-        for name in held[0]
-    }
+    held = forces(rows[:, 16:19].T, rows[:, 19:].T)
+    read_off = {f"rate_{VARIABLES[k]}": (rows[:, 8 + k], float(scales[k])) for k in MOVING[case]}
+    read_off |= {f"moving_force_{name}": (held[name], weight) for name in _determined(case)}
     best, other, lower = np.transpose([of / size for of, size in read_off.values()])
     steps, degrees = unlike(best - other, SURER), unlike(best - lower, SURER)
     # A contact that rolls is held by friction of a moment ago: its slip should not change at all,
@@ -360,13 +351,12 @@ def turns_or_hovers(case: Case, run: Trajectory, window: slice) -> bool:
     return False
 
 
-def _forces(case: Case, forces: Array) -> dict[str, float]:
-    """Of forces (6,) those that the motion determines, of the contacts that are closed."""
-    A_x, A_y, A_z, B_x, B_y, B_z = forces.tolist()
+def _determined(case: Case) -> list[str]:
+    """Names of the forces that the motion determines, of the contacts that are closed."""
     if case is Case.RR:  # the contacts share the load in ways that Newton's laws don't tell apart
-        return {"Ax-By": A_x - B_y, "Ay+By": A_y + B_y, "Bx+By": B_x + B_y, "Az": A_z, "Bz": B_z}
-    floor = {} if case.A is Contact.N else {"Ax": A_x, "Ay": A_y, "Az": A_z}
-    return floor | ({} if case.B is Contact.N else {"Bx": B_x, "By": B_y, "Bz": B_z})
+        return ["Ax-By", "Ay+By", "Bx+By", "Az", "Bz"]
+    closed = [name for name, side in (("A", case.A), ("B", case.B)) if side is not Contact.N]
+    return [f"{contact}{axis}" for contact in closed for axis in "xyz"]
 
 
 STARTS: tuple[tuple[float, tuple[float, ...]], ...] = (
@@ -542,11 +532,15 @@ def impacts(runner: Runner, sets: Sets, records: Records) -> Measured:
     for name, p in sets.items():
         for how, state in LANDINGS.items():
             start = _start(name, p, 0.8, state, how)
-            step = coarse_step(start.p) / STEP_RATIO
-            known = Conditions(start=how) | state_of(start.x0)
-            times: dict[str, Any] = {"divisors": (STEP_RATIO, 2 * STEP_RATIO)}
-            times["t_end"] = round(0.4 * time_unit(p) / step) * step
-            pairs.append(StepPair(**vars(start), **times, at=known, rows=len(LANDED)))
+            step, known = coarse_step(start.p) / STEP_RATIO, state_of(start.x0)
+            pair = StepPair(
+                **vars(start),
+                t_end=round(0.4 * time_unit(p) / step) * step,
+                divisors=(STEP_RATIO, 2 * STEP_RATIO),
+                at=Conditions(start=how) | known,
+                rows=len(LANDED),
+            )
+            pairs.append(pair)
     rebounds, tasks = dict.fromkeys(sets, 0), {name: list[Task]() for name in sets}
     landed = list[tuple[StepPairResult, int, float]]()
     for landing in carry_out(runner, pairs):

@@ -11,6 +11,7 @@ import numpy as np
 import analytic
 from analytic.slipping import slip_bounds, slip_stability
 from analytic.slipping.slip_bounds import HeldBound, SlipBound
+from analytic.slipping.slip_stability import SlipStability
 from compare.claim import Criterion, Outcome, Text, When, all_of, claim, given
 from compare.judge import simulated
 from compare.kit.record import Measurement, Relation, state
@@ -107,11 +108,6 @@ def _bounds(
     )
 
 
-def _rs_stationary(m: Measurement) -> SlipBound | HeldBound:
-    """The bound (67) of a ball that goes round with the fluid."""
-    return slip_bounds.rr_to_rs_stationary(m.parameters)
-
-
 def _neutral_flow(quantity: str, case: Case, by: str) -> Criterion:
     """A criterion on a threshold: the flow at which a case is neutral with respect to slipping."""
 
@@ -129,21 +125,20 @@ def _filippov_share(m: Measurement) -> float:
 
 def _case_on_wall(m: Measurement) -> float:
     """NR where it is stable with respect to slipping, else NS."""
-    stable = slip_stability.stability(Case.NR, m.parameters) is slip_stability.SlipStability.STABLE
-    return float(Case.NR if stable else Case.NS)
+    holds = slip_stability.stability(Case.NR, m.parameters)
+    return float(Case.NR if holds is SlipStability.STABLE else Case.NS)
 
 
-def _gammas(predict: Callable[[Measurement], float], when: When, by: str) -> Criterion:
-    """A criterion on how fast slips grow."""
-    return Criterion("growth", "gamma", predict, when=when, by=by)
+_gammas = partial(Criterion, "growth", "gamma")
+"""A criterion on how fast slips grow."""
 
 
 def _growth(arrow: tuple[Case, Case]) -> Iterator[Criterion]:
     """Criteria on slips along an arrow, at random or dragged, and on what follows them."""
     when = _along(arrow, "", "dragged")
-    yield _gammas(_gamma, when, "slip_stability.gamma")
+    yield _gammas(_gamma, when=when, by="slip_stability.gamma")
     if arrow == _NR_NS:
-        yield _gammas(_gamma_nr, when, "slip_bounds.gamma_nr")
+        yield _gammas(_gamma_nr, when=when, by="slip_bounds.gamma_nr")
     for protocol, ways in (
         ("growth", ("", "dragged", "sideways")),  # at rest RS and RN look the same
         ("bounds", ("held", "stationary")),
@@ -202,7 +197,7 @@ CLAIMS = (
         "On the wall alone slip in a direction grows in proportion to the friction that rolling "
         "needs in it, less what Coulomb's law allows. So γ < 0 in all directions exactly where "
         "(13) holds.",
-        _gammas(_by_forces, _along(_NR_NS, "", "dragged"), "analytic.contact_forces, (13)"),
+        _gammas(_by_forces, when=_along(_NR_NS, "", "dragged"), by="analytic.contact_forces, (13)"),
     ),
     claim(
         "eq-61",
@@ -228,7 +223,12 @@ CLAIMS = (
         "(67)",
         "Going round with the fluid, the ball never begins to slip at the wall alone, but at ω₀ = "
         "0.",
-        *_bounds(_RR_RS, "stationary", _rs_stationary, from_rest=True),
+        *_bounds(
+            _RR_RS,
+            "stationary",
+            lambda m: slip_bounds.rr_to_rs_stationary(m.parameters),
+            from_rest=True,
+        ),
     ),
     claim(
         "eq-73",
@@ -289,7 +289,7 @@ CLAIMS = (
         "Rolling is stable with respect to slipping up to a flow at which it is neutral, and "
         "unstable beyond (on the wall alone the other way round). At rest slip at the wall neither "
         "grows nor dies out.",
-        _gammas(_gamma, _along(_RR_RS, "rest"), "slip_stability.gamma"),
+        _gammas(_gamma, when=_along(_RR_RS, "rest"), by="slip_stability.gamma"),
         _neutral_flow("omega_01", Case.RR, "onset of slip"),
         _neutral_flow("omega_02", Case.NR, "onset of sliding on the wall"),
         _neutral_flow("omega_03", Case.RR, "loss of the floor"),
@@ -298,9 +298,7 @@ CLAIMS = (
         "extrema",
         "after (80)",
         "Out of RR into SS γ has its global extrema along (α, β) = (0, 0) and (π, π).",
-        Criterion(
-            "growth",
-            "gamma",
+        _gammas(
             _greatest_as_printed,
             when=_along(_RR_SS, "sideways"),
             relation=Relation.AT_MOST,

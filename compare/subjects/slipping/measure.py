@@ -50,6 +50,7 @@ from compare.kit.step_pairs import (
     WINDOW_DEGREES,
     Start,
     lag_error,
+    of_no_step,
     polynomials,
     random_state,
 )
@@ -663,9 +664,7 @@ def _onset(runs: Sequence[Trajectory]) -> Estimate | None:
     for coarse, fine in zip(map(_force, runs[::2]), map(_force, runs[1::2]), strict=True):
         if coarse is None or fine is None:
             return None
-        change = fine.value - coarse.value
-        best = replace(fine, value=fine.value + change * EXTRAPOLATION)
-        forces.append(best.also(time_step=abs(change) * DOUBT))
+        forces.append(of_no_step(coarse.value, fine))
     square = extrapolated_zero(squares, forces) if forces else Estimate(0.0, math.inf)
     if not square.value > 0 or math.isinf(square.uncertainty):
         return None

@@ -38,10 +38,7 @@ def _stationary(m: Measurement) -> StationarySolution:
 def _spectrum(m: Measurement) -> tuple[complex, ...]:
     """The eigenvalues of the stationary state, rad s-1; in NS y is cyclic (48): a zero."""
     state = _stationary(m)
-    return (
-        *([0.0] if state.case is Case.NS else []),
-        *(complex(value) for value in state.eigenvalues),
-    )
+    return (*([0.0] if state.case is Case.NS else []), *map(complex, state.eigenvalues))
 
 
 def _mode(m: Measurement) -> complex:

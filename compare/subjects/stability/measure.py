@@ -81,7 +81,9 @@ def measure(runner: Runner, sets: Sets, records: Records) -> Measured:
     found = [each for name, p in sets.items() for each in chosen_states(runner, records, name, p)]
     yield from (each for each in found if isinstance(each, Missing))
     pushed = [each for each in found if isinstance(each, Pushed)]
-    yield from (each.missing(NOT_LINEAR, rows=each.numbers) for each in pushed if each.too_hard)
+    for each in pushed:
+        if each.too_hard:
+            yield each.missing(NOT_LINEAR, 2 * len(each.active) + len(each.active) ** 2)
     states = [each for each in pushed if not each.too_hard]
     tasks = [state.tasks() for state in states]
     for state, own, runs in zip(states, tasks, runner.groups(tasks), strict=True):
@@ -170,11 +172,6 @@ class Pushed:
         return self.case in PUSH and self.bends
 
     @property
-    def numbers(self) -> int:
-        """Decay rates, frequencies, and responses."""
-        return 2 * len(self.active) + len(self.active) ** 2
-
-    @property
     def fast(self) -> bool:
         """Whether contacts slip fast enough for a push.
 
@@ -206,12 +203,11 @@ class Pushed:
                     tasks.append(self.runner.task(p, x, lasts * step, h, samples=samples))
         return tasks
 
-    def missing(self, why: str, modes: int = 0, rows: int = 0) -> Missing:
-        """A record of modes, all by default, whose decay rates and frequencies were not measured,
-        and why; of so many `rows` if they are more."""
+    def missing(self, why: str, rows: int = 0) -> Missing:
+        """A record of numbers that were not measured, and why; by default of all decay rates and
+        frequencies."""
         at = f"{self.case.name} at omega_0 = {self.start.p.omega_0:.4g} rad/s"
-        count = rows or 2 * (modes or len(self.active))
-        return self.runner.missing(self.start.set, f"{at}: {why}", count)
+        return self.runner.missing(self.start.set, f"{at}: {why}", rows or 2 * len(self.active))
 
 
 def chosen_states(
@@ -355,7 +351,7 @@ def _modes(state: Pushed, modes: Spectrum, step: float, row: Row) -> Measured:
     for mode, k in enumerate((k for k in order if exponents[k].imag >= 0), start=1):
         if abs(exponents[k]) * step > 0.25:
             why = f"one of its motions, by {abs(exponents[k]):.3g} 1/s, is too fast"
-            yield state.missing(f"{why} for the time step", 1)
+            yield state.missing(f"{why} for the time step", 2)
             continue
         rate, frequency = -float(exponents[k].real), float(exponents[k].imag)
         for name, value, other in (("decay_rate", rate, frequency), ("frequency", frequency, rate)):

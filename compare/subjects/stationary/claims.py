@@ -22,6 +22,7 @@ from compare.states import (
     lifts_first,
     slips_first,
     solution_of,
+    thresholds_of,
     value_in,
 )
 from model import Case, State
@@ -51,8 +52,8 @@ def case(m: Measurement) -> float:
 
 def rolling(m: Measurement) -> float:
     """RR as long as it exists, (84) and (86); beyond, a case that lasts, which RR is not."""
-    t = theory(analytic.thresholds, m.parameters.replace(omega_0=1.0))
-    limit = t.omega_01 if m.parameters.eta < m.parameters.j else t.omega_03
+    t = thresholds_of(m)
+    limit = t.omega_01 if slips_first(m) else t.omega_03
     if m.parameters.omega_0 < limit:
         return float(Case.RR)
     # beyond, forces may hold it
@@ -63,9 +64,8 @@ def rolling(m: Measurement) -> float:
 
 def _exists(case: Case, m: Measurement) -> bool:
     """Whether theory has a stationary state of a case."""
-    return any(
-        s.exists and s.case is case for s in theory(analytic.stationary_solutions, m.parameters)
-    )
+    found = theory(analytic.stationary_solutions, m.parameters)
+    return any(s.exists and s.case is case for s in found)
 
 
 def _value_criteria(

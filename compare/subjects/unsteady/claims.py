@@ -8,7 +8,7 @@ from functools import partial
 
 import analytic
 from analytic.flowmeter import pulsation, response
-from compare.claim import Criterion, claim, given
+from compare.claim import Criterion, claim, criteria, given
 from compare.judge import integrated, simulated, theory
 from compare.kit.record import Measurement, Relation, state
 from compare.kit.statistics import Estimate
@@ -40,6 +40,12 @@ def _onset_criterion(rule: str, relation: Relation) -> Criterion:
 
     by = f"{_BY}.pulsation.slip_onset, {rule}"
     return Criterion("pulsation", "slip_amplitude", onset, relation=relation, by=by)
+
+
+def _peak(m: Measurement) -> float:
+    """Time, s, or height of the peak after a jump of the flow, while the ball slips."""
+    time, height = theory(response.peak, m.parameters, Case.SS)
+    return time if m.quantity == "jump_peak" else height
 
 
 def _ramp_end(m: Measurement) -> Estimate:
@@ -160,15 +166,7 @@ CLAIMS = (
         "(26), (38)-(42)",
         "After a jump of the flow a ball that slips at both points overshoots its new reading and "
         "rings.",
-        *(
-            Criterion(
-                "unsteady",
-                quantity,
-                lambda m, k=k: theory(response.peak, m.parameters, Case.SS)[k],  # type: ignore[misc]
-                by=f"{_BY}.response.peak",
-            )
-            for k, quantity in enumerate(("jump_peak", "jump_height"))
-        ),
+        *criteria("unsteady", ("jump_peak", "jump_height"), _peak, by=f"{_BY}.response.peak"),
     ),
     claim(
         "ramp-fold",
