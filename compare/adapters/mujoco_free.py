@@ -11,7 +11,7 @@ import numpy as np
 
 import mjsim
 from compare.adapters.free import CORNERS, BodyState, Free, Touch
-from compare.adapters.scene import FACETS, TIME_STEPS, Scene, Vector, facing
+from compare.adapters.scene import FACETS, Scene, Vector, facing
 from model.arrays import Array
 
 FEATURES = ("two bodies", "moving surface", "dry joint", "tripod", "disc", "anisotropic friction")
@@ -31,7 +31,6 @@ class Bodies(Free):
 
     TELLS = TURNS = True
     FEATURES: tuple[str, ...] = FEATURES
-    TIMESTEPS: tuple[float, ...] = TIME_STEPS
 
     def __init__(
         self,
@@ -125,9 +124,8 @@ class Lawful(Bodies):
         # From the opposite velocity on, so that in the middle of the step, which friction looks at,
         # it has none.
         self.data.qpos[-2:], self.data.qvel[-2:] = 0.0, (-velocity @ normal, -velocity[2])
-        self.data.qfrc_applied[-2:] = (
-            self.model.dof_M0[-2:] * 2 / self.timestep * (velocity @ normal, velocity[2])
-        )
+        push = self.model.dof_M0[-2:] * 2 / self.timestep
+        self.data.qfrc_applied[-2:] = push * (velocity @ normal, velocity[2])
 
 
 def pairs(spec: Any, scene: Scene) -> Iterator[Any]:
@@ -135,12 +133,11 @@ def pairs(spec: Any, scene: Scene) -> Iterator[Any]:
     surface's friction."""
     lowest = "under" if scene.under else "body"
     there = {(pair.geomname1, pair.geomname2): pair for pair in spec.pairs}
+    shapes: dict[str, list[str]] = {}
+    for geom in spec.geoms:
+        shapes.setdefault(geom.name.rstrip("0123456789"), []).append(geom.name)
     for surface in scene.surfaces:
-        of = [
-            [g.name for g in spec.geoms if g.name.rstrip("0123456789") == name]
-            for name in (surface.name, lowest)
-        ]
-        for geom, part in itertools.product(*of):
+        for geom, part in itertools.product(shapes[surface.name], shapes[lowest]):
             if not (pair := there.get((geom, part))):
                 pair = spec.add_pair(geomname1=geom, geomname2=part, condim=3)
                 pair.friction = (surface.friction, surface.friction, 0.0, 0.0, 0.0)

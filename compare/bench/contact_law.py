@@ -70,7 +70,7 @@ class SoftContacts:
     @np.errstate(invalid="ignore")  # a contact that bears nothing
     def cone(self) -> Array:
         """Share of the friction cone, or pyramid, in use."""
-        used = np.abs(self.force[:, 1:]) / self.friction * self._frictional
+        used = self._scaled_friction
         share: Array = used.sum(1) if self.pyramidal else np.hypot.reduce(used, 1)
         return share / self.force[:, 0]
 
@@ -173,9 +173,7 @@ class SoftContacts:
     def law(self) -> ContactResponse:
         """What the contacts do under their loads."""
         load = self.force[:, 0]
-        mu = self.friction
-        frictional = self._frictional
-        slides = self.cone >= CONE
+        mu, frictional, slides = self.friction, self._frictional, self.cone >= CONE
         _, b, b_f = self._springs
         depth = self._depth(slides)
         softness, k, damping = self._rows(depth)
@@ -295,8 +293,7 @@ def contacts(model: Any, data: Any) -> tuple[SoftContacts, Array]:
     force = np.zeros((len(number), 6))
     for k, each in enumerate(number):
         mujoco.mj_contactForce(model, data, each, force[k])
-    # The weight of each body with all that is welded to it, N; inf if no joint moves it, 0 without
-    # gravity.
+    # of each body with all that is welded to it, N; inf if no joint moves it, 0 without gravity
     welded = np.bincount(model.body_weldid, model.body_mass, model.nbody)[model.body_weldid]
     weightless = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY
     g = 0.0 if weightless else np.hypot.reduce(model.opt.gravity)
@@ -365,10 +362,8 @@ def replacements(model: Any, c: SoftContacts, names: Sequence[str]) -> Iterator[
         if not np.allclose(own[0], own[1]):
             first, second, taken = (" ".join(f"{v:g}" for v in each) for each in (*own, mixed))
             one, other = (names[geom] for geom in c.geoms[0])
-            yield (
-                f"{name} of two geoms",
-                f"{first} ({one}) and {second} ({other}): {taken} is taken",
-            )
+            how = f"{first} ({one}) and {second} ({other}): {taken} is taken"
+            yield f"{name} of two geoms", how
 
 
 def geom_names(model: Any) -> list[str]:

@@ -37,10 +37,8 @@ BOUND = 1e-10
 @cache
 def cases() -> tuple[ContactCase, ...]:
     """All exact cases: those of version 1 first, of these those in closed form."""
-    first, second, third = (
-        [form() for form in those] for those in (CLOSED_FORMS, MECHANISMS, OBLIQUE)
-    )
-    return (*first, *(_in_vessel(*row) for row in VESSEL), *second, *third)
+    later = [form() for form in (*MECHANISMS, *OBLIQUE)]
+    return (*(form() for form in CLOSED_FORMS), *(_in_vessel(*row) for row in VESSEL), *later)
 
 
 def listing() -> list[list[str]]:
@@ -62,16 +60,13 @@ def write(directory: Path) -> None:
             write_text(directory / f"{case.name}.json", json.dumps(data, indent=1))
             write_text(directory / f"{case.name}.xml", case.mjcf())
             group = file.create_group(case.name)
-            group.attrs["about"], group.attrs["case"] = (
-                case.about,
-                json.dumps(data | {"times": [], "exact": []}),
-            )
+            group.attrs["about"] = case.about
+            group.attrs["case"] = json.dumps(data | {"times": [], "exact": []})
             group["time"], group["exact"] = case.times, case.exact
             group["contacts"] = np.array(case.contacts, dtype="S")
             group["time"].attrs["units"] = "s"
-            group["exact"].attrs["columns"] = (
-                "position (m), velocity (m s-1), spin (rad s-1), of each body"
-            )
+            columns = "position (m), velocity (m s-1), spin (rad s-1), of each body"
+            group["exact"].attrs["columns"] = columns
         whole.finish()
     write_text(directory / "README.md", README.read_text("utf-8").format(**said))
 

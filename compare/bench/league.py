@@ -30,12 +30,10 @@ ENTRIES: dict[str, str] = {
     "mujoco-defaults": f"{_OWN}.mujoco_free:defaults",
     "siconos": f"{_OWN}.siconos:best",
     **{
-        f"{name}{suffix}": f"{_OWN}.{name}:{which}"
-        for name in STUDIED
+        f"{name.replace('_', '-')}{suffix}": f"{_OWN}.{name}:{which}"
+        for name in (*STUDIED, "mujoco_warp")
         for suffix, which in (("", "best"), ("-defaults", "defaults"))
     },
-    "mujoco-warp": f"{_OWN}.mujoco_warp:best",
-    "mujoco-warp-defaults": f"{_OWN}.mujoco_warp:defaults",
     **{
         f"newton-{name.replace('_', '-')}": f"{_OWN}.newton:{name}"
         for name in ("kamino", "xpbd", "xpbd_defaults", "semiimplicit_defaults", "vbd_defaults")
@@ -51,8 +49,6 @@ KINDS = ("sticking", "rolling", "sliding", "landing")
 QUICK = (2e-3,)
 LEAST = 1e-8
 """Smaller errors are drawn here."""
-FEW = 3
-"""So many engines have room for their errors beside their marks."""
 ENTRY_MARKS = "osv^DPX*<>phd"
 ENTRY_COLOURS = "#0072B2 #D55E00 #009E73 #CC79A7 #E69F00 #56B4E9 #000000 #8C564B".split()
 
@@ -226,16 +222,11 @@ def draw(league: Mapping[str, Sequence[Result]]) -> Figure:
             look = {"marker": mark, "color": colour, "ms": 5.5, "lw": 1}
             look |= {"mfc": "white", "ls": ":"} if name.endswith("-defaults") else {}
             axes.plot(cost, np.maximum(error, LEAST), label=name, **look)
-            for at in zip(cost, error, strict=True) if len(shown) <= FEW else ():
-                place = at[0], max(at[1], LEAST)
-                beside: dict[str, Any] = {"xytext": (6, 3), "textcoords": "offset points"}
-                axes.annotate(f"{at[1]:.1e}", place, **beside, fontsize=8)
         axes.axhline(TOLERANCE, color="0.5", lw=0.8)
         axes.set(xscale="log", yscale="log", title=each)
         axes.grid(alpha=0.3)
     shared = panels[0, 0]
-    axes_with_data = ((shared.xaxis, shared.set_xlim), (shared.yaxis, shared.set_ylim))
-    for axis, limit in axes_with_data if shown else ():
+    for axis, limit in ((shared.xaxis, shared.set_xlim), (shared.yaxis, shared.set_ylim)):
         low, high = np.log10(axis.get_view_interval())
         limit(10 ** np.floor(low), 10 ** np.ceil(high))  # whole decades, each with its number
         axis.set_minor_formatter(NullFormatter())

@@ -85,11 +85,11 @@ def load(path: Path, keyframe: str | None = None) -> tuple[Any, Any]:
         raise InputError(f"{path}: MuJoCo refuses it: {said}") from error
     data, names = mujoco.MjData(model), [model.key(k).name or str(k) for k in range(model.nkey)]
     if keyframe is not None:
-        if keyframe not in names and keyframe not in map(str, range(model.nkey)):
+        numbers = {str(k): k for k in range(model.nkey)} | {n: k for k, n in enumerate(names)}
+        if keyframe not in numbers:
             others = f", but {few(names)}" if names else ""
             raise InputError(f"{path} has no keyframe {keyframe!r}{others}")
-        number = names.index(keyframe) if keyframe in names else int(keyframe)
-        mujoco.mj_resetDataKeyframe(model, data, number)
+        mujoco.mj_resetDataKeyframe(model, data, numbers[keyframe])
     return model, data
 
 
@@ -185,17 +185,15 @@ def settle(
         too_much.append(math.log(max(1.0, (change / (STEADY * speed + STILL)).max())))
         passed = data.time - begin
         tell(min(1.0, passed / min(limit, time_to_settle(too_much, passed))))
-    moving = {
-        int(b): f"{_body_name(model, int(b))} at {speed[b]:.2g} m/s"
-        for b in np.flatnonzero(restless)
-    }
-    steady, asleep = bool((change <= STEADY * speed + NOISE).all()), []
+    those = np.flatnonzero(restless).tolist()
+    moving = {b: f"{_body_name(model, b)} at {speed[b]:.2g} m/s" for b in those}
+    steady, roots = bool((change <= STEADY * speed + NOISE).all()), np.empty(0)
     if sleepy is not model:  # what it puts to sleep at once if it may
         state = copy.copy(data)
         step(sleepy, state, 2 * mujoco.mjMINAWAKE)
-        for tree in np.flatnonzero(state.tree_asleep >= 0):
-            asleep.append(_body_name(model, np.flatnonzero(model.body_treeid == tree)[0]))
-    return Rest(steady, moving, tuple(_collapsed(model, first, data)), tuple(asleep))
+        roots = model.tree_bodyadr[state.tree_asleep >= 0]
+    asleep = tuple(_body_name(model, body) for body in roots)
+    return Rest(steady, moving, tuple(_collapsed(model, first, data)), asleep)
 
 
 def time_to_settle(too_much: Sequence[float], passed: float) -> float:
