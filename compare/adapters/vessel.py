@@ -34,9 +34,6 @@ _ROLLS = 3.0
 how exact that is isn't known."""
 NOTED = 1024
 """Steps of which the cases are told at once."""
-_CARRIED = 5
-"""Numbers of a contact in a step's row, after the ball's nine: whether it carried anything, its
-force, N, its gap, m. """
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,29 +149,27 @@ class _Steps:
             p, timestep, engine.ahead / timestep, lambda load: np.full(np.shape(load), band)
         )
         self.kept = list[npt.NDArray[np.void]]()
-        self._rows, self._told, self._theta = np.empty((NOTED, 9 + 2 * _CARRIED)), 0, 0.0
+        self._told, self._theta = 0, 0.0
+        self._motions, self._forces = np.empty((NOTED, 3, 3)), np.empty((NOTED, 2, 3))
+        self._gaps = np.empty((NOTED, 2))  # nan where the engine has no contact
 
     def take(self) -> None:
         """Take a step, and note the state before it and what contacts carried in it."""
-        engine, row = self.engine, self._rows[self.done % NOTED]
-        row[:9], row[9:] = np.concatenate(engine.state()), 0.0
+        engine, k = self.engine, self.done % NOTED
+        self._motions[k] = engine.state()
         engine.step(1)
-        if not np.abs(np.concatenate(engine.look())).max() < _HUGE:
+        if not np.abs(engine.look()).max() < _HUGE:
             raise BreakdownError("diverged")
-        carried = row[9:].reshape(-1, _CARRIED)
-        if not engine.TELLS:
-            carried[:, 1:4] = np.nan
+        self._forces[k], self._gaps[k] = 0.0 if engine.TELLS else np.nan, np.nan
         for contact, force, gap in engine.touches() if engine.TELLS else ():
-            of = carried[contact]
-            of[4] = min(gap, of[4]) if of[0] else gap
-            of[0], of[1:4] = 1.0, of[1:4] + force
+            self._forces[k, contact] += force
+            self._gaps[k, contact] = np.fmin(gap, self._gaps[k, contact])
         self.done += 1
 
     def tell(self, last: bool) -> None:
         """Classify the steps noted since the last call, and keep the samples among them."""
         steps, self._told, p = np.arange(self._told, self.done), self.done, self.p
-        rows = self._rows[: len(steps)]
-        motion = Motion(*np.split(rows[:, :9], 3, axis=1))
+        motion = Motion(*self._motions[: len(steps)].transpose(1, 0, 2))
         state, azimuth = from_world(motion, p)
         theta = np.unwrap(np.append(self._theta, azimuth))
         self._theta = float(theta[-1])
@@ -182,9 +177,10 @@ class _Steps:
         # Forces are along the axes of where the ball was when they were found.
         x, y, _ = (motion.position + self.engine.ahead * motion.velocity).T
         axes = frame(np.arctan2(y, x))
-        for name, own in zip("AB", np.split(rows[:, 9:], 2, axis=1), strict=True):
-            block[f"force_{name}"] = np.einsum("nab,nb->na", axes, own[:, 1:4])
-            block[f"gap_{name}"] = np.where(own[:, 0] > 0, own[:, 4], block[f"gap_{name}"])
+        for k, name in enumerate("AB"):
+            force, gap = self._forces[: len(steps), k], self._gaps[: len(steps), k]
+            block[f"force_{name}"] = np.einsum("nab,nb->na", axes, force)
+            block[f"gap_{name}"] = np.where(np.isnan(gap), block[f"gap_{name}"], gap)
         slips, gaps = (
             np.stack([block[f"{what}_{k}"] for k in "AB"], axis=-1)
             for what in ("slip_speed", "gap")

@@ -187,11 +187,11 @@ def settle(
         tell(min(1.0, passed / min(limit, time_to_settle(too_much, passed))))
     those = np.flatnonzero(restless).tolist()
     moving = {b: f"{_body_name(model, b)} at {speed[b]:.2g} m/s" for b in those}
-    steady, roots = bool((change <= STEADY * speed + NOISE).all()), np.empty(0)
+    steady, roots = bool((change <= STEADY * speed + NOISE).all()), list[int]()
     if sleepy is not model:  # what it puts to sleep at once if it may
         state = copy.copy(data)
         step(sleepy, state, 2 * mujoco.mjMINAWAKE)
-        roots = model.tree_bodyadr[state.tree_asleep >= 0]
+        roots = model.tree_bodyadr[state.tree_asleep >= 0].tolist()
     asleep = tuple(_body_name(model, body) for body in roots)
     return Rest(steady, moving, tuple(_collapsed(model, first, data)), asleep)
 
