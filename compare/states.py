@@ -23,6 +23,11 @@ def lasting_cases(p: Parameters) -> set[Case]:
     return {s.case for s in solutions(p)} - {Case.SR}
 
 
+def exists(case: Case, m: Measurement) -> bool:
+    """Whether theory has a stationary state of a case, for which friction suffices."""
+    return any(s.exists for s in theory(analytic.stationary_solutions, m.parameters, (case,)))
+
+
 def case_of(m: Measurement) -> Case:
     """The case of the state that was measured; contacts that carry nothing count as none.
 

@@ -19,6 +19,7 @@ from compare.kit import style
 from compare.kit.drawing import Diagram, Drawing, Evidence, GapError, diagram, only_where, warn_of
 from compare.kit.engines import EVENT
 from compare.kit.record import Measurement
+from compare.subjects.flowmeter.measure import UNLOADED
 from model import Case, Contact, Parameters
 
 SETS = {"fig-13-left": "reference", "fig-13-right": "high-wall-friction"}
@@ -208,8 +209,7 @@ def draw_fall(of: Diagram) -> tuple[Figure, str]:
         k = k[:: max(1, len(k) // 1500)]
         t = unit * (run.time[k] - origin)
         gaps, speed, slip = column
-        dots: dict[str, Any] = {"color": "black"}
-        dots |= {} if column is whole else {"marker": ".", "ms": 3}
+        dots: dict[str, Any] = {"color": "black", "marker": "" if column is whole else ".", "ms": 3}
         gaps.plot(t, size * run.y[k], label="$y$ (floor)", **dots)
         gaps.plot(t, size * run.h[k], color=style.FORCE, ls="--", label="$h$ (wall)")
         if column is whole:
@@ -259,7 +259,7 @@ def _settled(evidence: Evidence) -> Iterator[Measurement]:
 
 def _falls(evidence: Evidence) -> Iterator[Measurement]:
     """What was measured of the fall that is kept."""
-    return evidence.records.select("unloading", where=lambda m: m.at["start"] == "unloading")
+    return evidence.records.select("unloading", where=lambda m: m.at["start"] == UNLOADED)
 
 
 FIGURES = {"characteristic": Drawing("Characteristic curves", select_curves, draw_curves)} | {
@@ -281,13 +281,12 @@ def draw_readings(made: Design) -> tuple[Figure, str]:
     )
     axes.fill_between(flows, below, above, color="0.82", lw=0, label="within the tolerances")
     axes.plot(flows, low, color=style.COLOURS[Case.SS], lw=2, label="nominal, rising flow")
-    falling: dict[str, Any] = {"color": style.COLOURS[Case.NR], "lw": 2, "ls": "--"}
-    axes.plot(flows, high, **falling, label="nominal, falling flow")
-    wanted: dict[str, Any] = {"color": "#0072B2", "alpha": 0.12, "lw": 0}
-    axes.axvspan(request.slowest, request.fastest, **wanted, label="flows to measure")
-    limit: dict[str, Any] = {"color": style.FORCE, "alpha": 0.25, "lw": 1}
-    limit["label"] = "limit, from worst to nominal"
-    axes.axvspan(chosen.worst.omega_0, chosen.limit.omega_0, **limit)
+    falls = style.COLOURS[Case.NR]
+    axes.plot(flows, high, color=falls, lw=2, ls="--", label="nominal, falling flow")
+    wanted = request.slowest, request.fastest
+    axes.axvspan(*wanted, color="#0072B2", alpha=0.12, lw=0, label="flows to measure")
+    limit = chosen.worst.omega_0, chosen.limit.omega_0
+    axes.axvspan(*limit, color=style.FORCE, alpha=0.25, lw=1, label="limit, from worst to nominal")
     axes.set(xlim=(0, flows[-1]), ylim=(0, None), xlabel=style.OMEGA_0, ylabel=style.OMEGA_C)
     style.guides(axes, {key: getattr(made.thresholds, key) for key in THRESHOLDS})
     style.legend(axes, loc="lower right")

@@ -18,6 +18,7 @@ from compare.kit.quantities import quantity
 from compare.kit.record import Measurement, state
 from compare.kit.settling import forces
 from compare.kit.statistics import Estimate
+from compare.states import exists
 from compare.subjects.motion.measure import LANDED, late_ramp
 from model import Case, Trajectory
 from model.cases import TRAITS
@@ -76,11 +77,6 @@ def _is_stable(case: Case, m: Measurement) -> bool:
     return slip_stability.stability(case, m.parameters) is SlipStability.STABLE
 
 
-def _exists(case: Case, m: Measurement) -> bool:
-    """Whether friction suffices for the stationary state of a case."""
-    return any(s.exists for s in theory(analytic.stationary_solutions, m.parameters, (case,)))
-
-
 def _rolls_or_slips(holds: Callable[[Case, Measurement], bool], m: Measurement) -> float:
     """The case along a smooth wall: RS as long as `holds` says that it lasts, SS beyond."""
     return float(Case.RS if holds(Case.RS, m) else Case.SS)
@@ -95,14 +91,8 @@ def _braked_rolls(m: Measurement) -> float:
 
 def _motion(m: Measurement, leave_rolling: str = "slip-stability") -> Trajectory:
     """Theory's motion for the time of the measured one."""
-    return theory(
-        analytic.simulate,
-        m.parameters,
-        state(m),
-        m.at["time"],
-        leave_rolling=leave_rolling,
-        rtol=RTOL,
-    )
+    begun = m.parameters, state(m), m.at["time"]
+    return theory(analytic.simulate, *begun, leave_rolling=leave_rolling, rtol=RTOL)
 
 
 def _rolls_or_motion(m: Measurement) -> float:
@@ -204,7 +194,7 @@ LAW_CLAIMS = (
         "Faster, it slips.",
         *(
             Criterion("runs", "case", partial(_rolls_or_slips, holds), when=_SMOOTH, by=by)
-            for holds, by in ((_is_stable, _HOLDS), (_exists, "analytic.stationary_solutions"))
+            for holds, by in ((_is_stable, _HOLDS), (exists, "analytic.stationary_solutions"))
         ),
         Criterion("runs", "end_omega_c", _end_of_motion, when=_SMOOTH, by=_RUN),
     ),

@@ -405,7 +405,8 @@ def motions(runner: Runner, sets: Sets, records: Records) -> Measured:
         if lacking := count - len(chosen):
             why = "near the ends of pieces the case changes, or a contact hovers, creeps or slips "
             yield runner.missing(name, f"{why}by a trace", lacking * (1 + TURNS))
-        for first, last in ((first, first + PIECE) for first in chosen):
+        for first in chosen:
+            last = first + PIECE
             case = Case(int(run.case[last]))
             seen[name].add(case)
             x = constrained(Case(int(run.case[first])), run.x[first], p)
@@ -413,8 +414,7 @@ def motions(runner: Runner, sets: Sets, records: Records) -> Measured:
             at = Conditions(case=case.name, time=time) | state_of(x)
             yield runner.measurement(name, p, "case", case, [task], **at)
             divisors = STEP_RATIO // 2, STEP_RATIO, 2 * STEP_RATIO
-            piece = StepPair(name, p, case.name, x, time, divisors, at=at, rows=TURNS)
-            again.append(piece)
+            again.append(StepPair(name, p, case.name, x, time, divisors, at=at, rows=TURNS))
     for result in carry_out(runner, again):
         yield from [result] if isinstance(result, Missing) else _turns_at_end(result)
     for name, cases in seen.items():
@@ -602,6 +602,10 @@ RUN_STARTS: dict[str, tuple[float, float, tuple[float, ...]]] = {
 """omega_0, how long, and the state, each in units of R, sqrt(R/g), and for slip sqrt(g R)/r."""
 
 
+AT_A_BORDER = ("smooth wall", "rough floor")
+"""Starts next to a change of case, of which only case and orbit are measured."""
+
+
 def late_ramp(p: Parameters, rate: float, time: float) -> Flow:
     """A flow that is steady for half of a time in s, and then changes at a rate in rad/s^2."""
     return Flow.ramp(p.omega_0, p.omega_0 + rate * time / 2, time / 2, time / 2)
@@ -629,11 +633,11 @@ def whole_runs(runner: Runner, sets: Sets, records: Records) -> Measured:
         elif how == "rough floor" and fine.force_A[:, 1].mean() < PRESSES * p.m * p.g:
             yield run.missing(f"{how}: the contact force is so small that the ball may hover")
         else:
-            if apart := how in ("smooth wall", "rough floor"):  # next to a change of case
+            if at_border := how in AT_A_BORDER:
                 yield run.row("case", float(fine.case[-1]), time=time)
-            least = lag_error(run.runner, p) if apart or changes(fine) else 0.0
+            least = lag_error(run.runner, p) if at_border or changes(fine) else 0.0
             for variable, value, size, off in zip(VARIABLES, *_ends(run), strict=True):
-                if variable == "omega_c" or not apart:
+                if variable == "omega_c" or not at_border:
                     row = estimate(value, size, time_step=max(off, least))
                     yield run.row(f"end_{variable}", row, time=time)
 
@@ -643,31 +647,30 @@ def _pairs(name: str, p: Parameters) -> Iterator[StepPair]:
     unit = time_unit(p)
 
     def pair(
-        how: str, p: Parameters, x: State, lasts: float, rows: int = 1, rate: float | None = None
+        how: str, p: Parameters, x: State, lasts: float, rate: float | None = None
     ) -> StepPair:
         count, x0, flow = round(lasts * unit / coarse_step(p)), x.stacked(), None
         t_end, at = count * coarse_step(p), Conditions(start=how) | state_of(x0)
         if rate is not None:
             flow, at = late_ramp(p, rate, t_end), at | Conditions(rate=rate)
-        begun = StepPair(name, p, how, x0, t_end, (4, 8, 16), count, rows=rows)
-        return replace(begun, flow=flow, at=at)
+        rows = 2 if how in AT_A_BORDER else len(VARIABLES)
+        return StepPair(name, p, how, x0, t_end, (4, 8, 16), count, flow=flow, at=at, rows=rows)
 
     for how, (flow, lasts, x) in RUN_STARTS.items():
         start, q = State(*(np.array(x) * state_units(p))), p.replace(omega_0=flow / unit)
-        yield pair(how, q, start, lasts, rows=len(VARIABLES))
+        yield pair(how, q, start, lasts)
         if how == "thrown" and p.drag == QUADRATIC:
-            blunter = q.replace(C_D=1.1)  # that of a disk
-            yield pair("thrown, blunter", blunter, start, lasts, rows=len(VARIABLES))
+            yield pair("thrown, blunter", q.replace(C_D=1.1), start, lasts)  # as blunt as a disk
     for how, rate in ("rolls while the flow rises", 0.2), ("rolls while the flow falls", -0.2):
         q = p.replace(omega_0=0.5 / unit)
-        yield pair(how, q, State(omega_c=q.omega_0), 2.0, len(VARIABLES), rate / unit**2)
+        yield pair(how, q, State(omega_c=q.omega_0), 2.0, rate / unit**2)
     for flow in (0.5, 0.7, 0.9, 1.1, 1.3):
         going = State(omega_c=flow / unit, slip_y=math.sqrt(p.g * p.R) / p.r)
-        yield pair("smooth wall", p.replace(omega_0=flow / unit, eta=0.0), going, 1.0, rows=2)
+        yield pair("smooth wall", p.replace(omega_0=flow / unit, eta=0.0), going, 1.0)
     for flow in (1.5, 1.7, 1.8, 2.0, 2.2):
         spin = flow / unit * p.R / p.r
         slight = State(omega_c=flow / unit, slip_x=-5e-4 * spin, slip_z=5e-3 * spin)
-        yield pair("rough floor", p.replace(omega_0=flow / unit, mu=1.7), slight, 1.0, rows=2)
+        yield pair("rough floor", p.replace(omega_0=flow / unit, mu=1.7), slight, 1.0)
 
 
 PROTOCOLS = (

@@ -16,6 +16,7 @@ from compare.kit.record import Measurement, Relation
 from compare.kit.settling import FORCES, SUMS
 from compare.states import (
     case_of,
+    exists,
     from_floor,
     is_in,
     lasting_cases,
@@ -38,7 +39,7 @@ def case(m: Measurement) -> float:
     carries it, and sinks where not."""
     allowed = lasting_cases(m.parameters)
     if m.at["start"] == "on the wall":
-        if case_of(m) is Case.NS and _exists(Case.NR, m):
+        if case_of(m) is Case.NS and exists(Case.NR, m):
             raise LookupError("NR exists, and yet the ball sinks")
         allowed &= {Case.NR} if Case.NR in allowed else {Case.NS}
     else:
@@ -57,15 +58,9 @@ def rolling(m: Measurement) -> float:
     if m.parameters.omega_0 < limit:
         return float(Case.RR)
     # beyond, forces may hold it
-    if case_of(m) is Case.RR or (_exists(Case.RR, m) and m.parameters.mu < 1):
+    if case_of(m) is Case.RR or (exists(Case.RR, m) and m.parameters.mu < 1):
         raise LookupError("RR has ended")
     return case(m)
-
-
-def _exists(case: Case, m: Measurement) -> bool:
-    """Whether theory has a stationary state of a case."""
-    found = theory(analytic.stationary_solutions, m.parameters)
-    return any(s.exists and s.case is case for s in found)
 
 
 def _value_criteria(

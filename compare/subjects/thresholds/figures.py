@@ -259,7 +259,9 @@ def _spins(cases: tuple[str, ...], evidence: Evidence) -> list[Measurement]:
 
 
 def _select_released(_: Evidence) -> Diagram:
-    """Fig. 12, with (12) released: theory alone, since nothing measured can pull."""
+    """Fig. 12, with (12) released: theory alone, since nothing measured can pull.
+
+    A function with a name, for other processes draw: no lambda can be sent to them."""
     return Diagram("fig-12", RELEASED)
 
 
