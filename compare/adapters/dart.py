@@ -54,7 +54,8 @@ class Dart(Free):
             else:
                 _, node = skeleton.createWeldJointAndBodyNodePair()
             self.plane = bodies.PlaneShape(normal, point)  # the last one is the one that moves
-            self.add(skeleton, node, self.plane, surface.friction, restitution=surface.restitution)
+            self.add(node, self.plane, surface.friction, surface.restitution)
+            self.world.addSkeleton(skeleton)
         self.nodes: list[Any] = []
         for body, friction in zip(scene.bodies, (1e3, scene.between), strict=False):
             skeleton = bodies.Skeleton(f"body{len(self.nodes)}")
@@ -73,17 +74,12 @@ class Dart(Free):
                     shape = bodies.BoxShape(2 * size)
                 else:
                     shape = bodies.SphereShape(size[0])
-                self.add(skeleton, node, shape, friction, at)
+                self.add(node, shape, friction, 1.0, at)
+            self.world.addSkeleton(skeleton)
             self.nodes.append(node)
 
     def add(
-        self,
-        skeleton: Any,
-        node: Any,
-        shape: Any,
-        friction: float,
-        at: Any = (0, 0, 0),
-        restitution: float = 1.0,
+        self, node: Any, shape: Any, friction: float, restitution: float, at: Any = (0, 0, 0)
     ) -> None:
         """Give a body a shape with friction and restitution, at a place in its axes."""
         frame = node.createShapeNode(shape)
@@ -92,8 +88,6 @@ class Dart(Free):
         dynamics = frame.createDynamicsAspect()
         dynamics.setFrictionCoeff(friction)
         dynamics.setRestitutionCoeff(restitution)
-        if not self.world.hasSkeleton(skeleton):
-            self.world.addSkeleton(skeleton)
 
     def drive(self, joint: Any, axis: Any, rate: float) -> None:
         """Let a joint of one axis go at a rate, m/s or rad/s."""

@@ -248,10 +248,10 @@ def _load(given: Any) -> tuple[Any, About]:
             engine = importlib.import_module(module)
             engine = getattr(engine, member) if member else engine
         except Exception as error:  # whatever a module or a broken package does when it is imported
-            package = _package(given, None).partition(" ")[0]
+            package, known = _package(given, None)
             if package and version(package) == ABSENT:
                 return None, About(str(given), missing=absent(package))
-            works = f" ({text})" if (text := _version(given, None)) else ""
+            works = f" ({known})" if known else ""
             raise InputError(f"{type(error).__name__}: {_one_line(error)}{works}") from error
     name = getattr(engine, "NAME", getattr(engine, "__name__", type(engine).__name__))
     lacking = [function for function in FUNCTIONS if not callable(getattr(engine, function, None))]
@@ -260,25 +260,20 @@ def _load(given: Any) -> tuple[Any, About]:
             f"{name} has no function {' nor '.join(lacking)}; an engine has {', '.join(FUNCTIONS)}"
         )
     told = {what: getattr(engine, name) for what, name in TOLD.items() if hasattr(engine, name)}
-    about = About(name, version=_version(given, engine), **told)
+    about = About(name, version=_package(given, engine)[1], **told)
     check_choice("PRECISION", about.precision, list(FLOORS))
     steps = tuple(check_number("TIMESTEPS", step, "s", POSITIVE) for step in about.steps)
     return engine, replace(about, steps=steps, features=tuple(about.features))
 
 
-def _version(given: Any, engine: Any) -> str:
-    """The version of an engine's package, and that with which it is known to work."""
-    package, _, known = _package(given, engine).partition(" ")
-    here = version(package) if package else ""
-    other = f", known to work: {known}" if known and here != known else ""
-    return f"{package} {here}".strip() + other
-
-
-def _package(given: Any, engine: Any) -> str:
-    """An engine's package, and the version known to work; or nothing."""
+def _package(given: Any, engine: Any) -> tuple[str, str]:
+    """An engine's package, and in words its version and the one known to work; empty if unknown."""
     _, ours, own = str(given).rpartition(f"{adapters.__name__}.")
     listed = adapters.KNOWN.get(own.partition(":")[0], "") if ours else ""
-    return str(getattr(engine, "KNOWN", listed))
+    package, _, known = str(getattr(engine, "KNOWN", listed)).partition(" ")
+    here = version(package) if package else ""
+    other = f", known to work: {known}" if known and here != known else ""
+    return package, f"{package} {here}".strip() + other
 
 
 def _one_line(error: Exception) -> str:
