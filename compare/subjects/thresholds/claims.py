@@ -35,7 +35,7 @@ def _threshold(
     return Criterion(protocol, quantity, predict, when=when, by=f"{_BY}: {quantity}")
 
 
-_thresholds = partial(Criterion, "thresholds")
+_measured = partial(Criterion, "thresholds")
 """A criterion on what this protocol measures."""
 
 
@@ -77,7 +77,7 @@ def _holds(name: str) -> Iterator[Criterion]:
         return theory(_end_of_rolling, name, m.parameters.replace(omega_0=1.0))
 
     for quantity in ("omega_01", "omega_03"):
-        yield _thresholds(
+        yield _measured(
             quantity, predict, when=lambda m: m.parameters.mu < 1, by=f"rolling_forces.{name}"
         )
 
@@ -115,16 +115,14 @@ CLAIMS = (
         "With η > j two-point rolling ends at ω₀₃: below, a ball pressed to the floor settles in "
         "it; above, it leaves it.",
         _threshold("omega_03"),
-        _thresholds(
-            "lifts", lambda m: math.isnan(thresholds_of(m).omega_01), by=f"{_BY}: omega_01"
-        ),
+        _measured("lifts", lambda m: math.isnan(thresholds_of(m).omega_01), by=f"{_BY}: omega_01"),
     ),
     claim(
         "table-5-F",
         "Table 5, F",
         "The stable branch of slipping at both points ends in a fold at ω₀₄, where there is one.",
         _threshold("omega_04"),
-        _thresholds(
+        _measured(
             "folds", lambda m: math.isfinite(thresholds_of(m).omega_04), by=f"{_BY}: omega_04"
         ),
     ),
@@ -144,7 +142,7 @@ CLAIMS = (
         "(87), Fig. 7",
         "Slipping at both points ends in a fold for η_cr < η < j. For η < η_cr it passes to the "
         "state carried by the wall at ω₀₂, without a jump.",
-        _thresholds(
+        _measured(
             "folds", lambda m: m.parameters.eta > thresholds_of(m).eta_cr, by=f"{_BY}: eta_cr"
         ),
         Criterion(
@@ -159,18 +157,18 @@ CLAIMS = (
         "one-fold",
         "after Prop. 7",
         "There is only one fold ω₀₄, and it lies above ω₀₁ and ω₀₂.",
-        _thresholds(
+        _measured(
             "omega_04",
             lambda m: max(thresholds_of(m).omega_01, thresholds_of(m).omega_02),
             relation=Relation.AT_LEAST,
             by=f"{_BY}: omega_01, omega_02",
         ),
-        _thresholds(
+        _measured(
             "folds",
             lambda m: bifurcation.number_of_folds(m.parameters),
             by="diagram.number_of_folds",
         ),
-        _thresholds("omega_04", _greatest_flow, by="slipping_branch.states"),
+        _measured("omega_04", _greatest_flow, by="slipping_branch.states"),
     ),
 )
 SECTIONS = {"Bifurcations": CLAIMS}

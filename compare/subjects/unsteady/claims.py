@@ -21,15 +21,15 @@ _BY = "analytic.flowmeter"
 _RATE = f"{_BY}.response.rolling_rate"
 
 
-def _followed(m: Measurement) -> tuple[Estimate, Estimate]:
-    """Gain and phase lag, rad, of omega_c in a pulsation, while the ball rolls."""
+def _followed(m: Measurement) -> Estimate:
+    """Gain, or phase lag, rad, of omega_c in a pulsation, while the ball rolls."""
     if m.parameters.drag == STOKES:
         ratio, left_out = complex(theory(response.transfer, m.parameters, Case.RR, m.at["f"])), 0.0
     else:
         ratio = theory(pulsation.first_harmonic, m.parameters, m.at["amplitude"], m.at["f"])
         left_out = pulsation.LEFT_OUT
-    gain = abs(ratio)
-    return Estimate(gain, left_out), Estimate(-cmath.phase(ratio), left_out / gain)
+    gain = Estimate(abs(ratio), left_out)
+    return gain if m.quantity == "gain" else Estimate(-cmath.phase(ratio), left_out / gain.value)
 
 
 def _onset_criterion(rule: str, relation: Relation) -> Criterion:
@@ -107,13 +107,12 @@ CLAIMS = (
         "Rolling at both points the ball follows the flow, pulsating or after a jump, as drag "
         "alone accelerates it and its spin. With Stokes' law that is a lag of first order with the "
         "time constant (1 + 2j)/c.",
-        Criterion(
+        *criteria(
             "pulsation",
-            "gain",
-            lambda m: _followed(m)[0],
+            ("gain", "phase_lag"),
+            _followed,
             by=f"{_BY}.response.transfer, pulsation.first_harmonic",
         ),
-        Criterion("pulsation", "phase_lag", lambda m: _followed(m)[1], by="the same"),
         Criterion(
             "unsteady", "jump_delay", lambda m: 1 / response.rolling_rate(m.parameters), by=_RATE
         ),
