@@ -28,8 +28,6 @@ STEADY, STILL = 2e-3, 1e-8
 """A speed that changes by no more than this share, or this (m/s), in a window has settled."""
 MOST_POINTS = 25_000_000
 """Of a heightfield or texture: 5000 by 5000, some 200 MB while it is compiled."""
-_FIELDS = {"hfield": ("heightfield", "nrow", "ncol"), "texture": ("texture", "width", "height")}
-"""Elements of MJCF that have so many points: their names, and attributes with rows and columns."""
 NOISE = 1e-6
 """Speeds that are not told apart, m/s."""
 RESTLESS, JOLT, TURNING = 0.3, 1e-3, 0.05
@@ -73,7 +71,8 @@ def load(path: Path, keyframe: str | None = None) -> tuple[Any, Any]:
     except UnicodeDecodeError as error:
         raise StorageError(f"cannot read {path}: MuJoCo takes no name but in UTF-8") from error
     try:
-        _check_sizes(path)
+        _check_sizes(_heightfields(path))
+        _check_sizes(_sizes(mujoco.MjSpec.from_file(name)))
         model = mujoco.MjModel.from_xml_path(name)
         check_number("timestep", model.opt.timestep, "s", POSITIVE)
     except InputError as error:
@@ -93,19 +92,36 @@ def load(path: Path, keyframe: str | None = None) -> tuple[Any, Any]:
     return model, data
 
 
-def _check_sizes(path: Path) -> None:
-    """`InputError` for a field of points that no memory holds: MuJoCo makes room as it reads."""
+Sizes = dict[str, tuple[int, int]]
+"""Rows and columns of what a model is made of."""
+
+
+def _heightfields(path: Path) -> Sizes:
+    """Those of the file itself: MuJoCo makes room for them while it reads."""
     try:
-        elements = [*ElementTree.parse(path).iter()]
+        found = ElementTree.parse(path).iter("hfield")
     except (ElementTree.ParseError, LookupError, ValueError):
-        return  # MuJoCo says what is wrong
-    for each in elements:
-        what, *names = _FIELDS.get(each.tag, ("",))
-        sizes = [each.get(name, "") for name in names]
-        if all(map(str.isdecimal, sizes)) and math.prod(map(int, sizes)) > MOST_POINTS:
+        return {}  # MuJoCo says what is wrong
+    sizes = {each.get("name"): (each.get("nrow", ""), each.get("ncol", "")) for each in found}
+    return {
+        f"heightfield {name!r}": (int(rows), int(columns))
+        for name, (rows, columns) in sizes.items()
+        if rows.isdecimal() and columns.isdecimal()
+    }
+
+
+def _sizes(spec: Any) -> Sizes:
+    """Those of what MuJoCo has read, included files and defaults with it."""
+    sizes = {f"heightfield {each.name!r}": (each.nrow, each.ncol) for each in spec.hfields}
+    return sizes | {f"texture {each.name!r}": (each.width, each.height) for each in spec.textures}
+
+
+def _check_sizes(sizes: Sizes) -> None:
+    """`InputError` for what a line of MJCF can ask for and no memory holds."""
+    for what, (rows, columns) in sizes.items():
+        if rows * columns > MOST_POINTS:
             raise InputError(
-                f"{what} {each.get('name', '')!r} has {' x '.join(sizes)} points; {MOST_POINTS:g} "
-                "are the most that are taken"
+                f"{what} has {rows} x {columns} points; {MOST_POINTS:g} are the most that are taken"
             )
 
 

@@ -393,6 +393,13 @@ def test_a_huge_heightfield_is_refused_before_it_is_made(forecasts, monkeypatch)
     assert "heightfield 'h'" in forecasts(text, code=2)
 
 
+def test_a_huge_texture_is_refused_in_included_files_too(forecasts, tmp_path):
+    texture = '<texture name="t" builtin="flat" width="6000" height="6000"/>'
+    (tmp_path / "more.xml").write_text(f"<mujoco><asset>{texture}</asset></mujoco>")
+    error = forecasts(mjcf(LEVEL, rest='<include file="more.xml"/>'), code=2)
+    assert "texture 't' has 6000 x 6000 points" in error
+
+
 def test_the_page_the_json_and_what_the_engine_replaces(forecasts, tmp_path):
     text = SCENES["hidden mix"].replace("<option ", '<option timestep=".008" ')
     shown = forecasts(text, "--try", "--json", "-o", str(page := tmp_path / "page.html"))
