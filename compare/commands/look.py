@@ -54,7 +54,7 @@ def inspect(args: argparse.Namespace) -> int:
             drawing.save(collection.draw(gathered), args.plot)
         if args.table:
             table.write(args.table, collection.labelled(gathered))
-        told = collection.described(gathered)
+        told = collection.describe(gathered)
         options.show(told, args.json, collection.shown(told))
         return 0
     if args.plot:

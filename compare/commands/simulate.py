@@ -131,6 +131,6 @@ def collect(args: argparse.Namespace) -> int:
         if path != args.output:
             table.write(args.output, collection.labelled(of))
     print(f"{count} run{'s' * (count != 1)} gathered into {args.output}")
-    if said := collection.unsettled(collection.described(of)):
+    if said := collection.unsettled(collection.describe(of)):
         options.warn(said)
     return 0

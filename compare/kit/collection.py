@@ -76,12 +76,9 @@ def collect(
         gathered = work.map(partial(_columns_of_files, directory), shares)
         for k, (found, unread) in enumerate(gathered, 1):
             progress(k / len(shares))
-            parts += [found] if found else []
+            parts.append(found)
             problems += unread
-    table = {
-        name: np.concatenate([part.pop(name) for part in parts])
-        for name in list(parts[0] if parts else ())
-    }
+    table = _one_below_the_other(parts)
     rows, twofold = _each_once(table, directory)
     problems += twofold
     if problems:
@@ -149,46 +146,40 @@ def _columns_of_files(directory: Path, files: Sequence[Path]) -> tuple[Columns, 
     parts, problems = [], []
     for file in files:
         try:
-            if rows := _rows(file, file.relative_to(directory)):
-                parts.append(rows)
+            parts.append(_rows(file, file.relative_to(directory)))
         except StorageError as error:
             problems.append(str(error))
-    return {
-        name: np.concatenate([part[name] for part in parts]) for name in (parts[0] if parts else ())
-    }, problems
+    return _one_below_the_other(parts), problems
+
+
+def _one_below_the_other(parts: Sequence[Columns]) -> Columns:
+    """The rows of all parts in one; the parts are emptied, for memory's sake."""
+    full = [part for part in parts if part]
+    names = list(full[0]) if full else []
+    return {name: np.concatenate([part.pop(name) for part in full]) for name in names}
 
 
 def _rows(path: Path, shown: Path) -> Columns:
     """The columns of all runs of a file, whose name in the collection begins with `shown`; of a
     collection, which holds no run, none."""
     with reading(path) as file:
-        if file.attrs.get("schema") == SCHEMA:
+        schema, version = file.attrs.get("schema"), file.attrs.get("schema_version")
+        if schema == SCHEMA:
             return {}
-        if file.attrs.get("schema") != MEANS:
-            found = None
-        elif file.attrs.get("schema_version") != MEANS_VERSION:
+        if schema == MEANS and version != MEANS_VERSION:
             raise StorageError(
                 f"it holds means of another version; this program reads {MEANS_VERSION}"
             )
-        else:
-            found = {name: column(dataset(file, name)) for name in file}
-            found = {
-                name: values.astype(str) if values.dtype.kind == "O" else values
-                for name, values in found.items()
-            }
+        stored = {name: column(dataset(file, name)) for name in file} if schema == MEANS else {}
+    found = {n: v.astype(str) if v.dtype.kind == "O" else v for n, v in stored.items()}
     found = found or _means(storage.load_runs(path))
-    of = [
-        dict(zip(found, row, strict=True))
-        for row in zip(*(values.tolist() for values in found.values()), strict=True)
-    ]
-    theory = np.full((len(VARIABLES), len(of)), math.nan)
-    for k, row in enumerate(of):
-        if row["case"] >= 0 and row["steady"]:
-            p = Parameters(**{f.name: row[f.name] for f in dataclasses.fields(Parameters)})
-            with suppress(InputError):  # the case has no stable stationary solution, or not one
-                solution = analytic.solution(p, Case(row["case"]))
-                known = [name not in solution.family for name in VARIABLES]
-                theory[:, k] = np.where(known, solution.state, math.nan)
+    theory = np.full((len(VARIABLES), len(found["run"])), math.nan)
+    for k in np.flatnonzero((found["case"] >= 0) & found["steady"]).tolist():
+        p = _parameters(found, k)
+        with suppress(InputError):  # the case has no stable stationary solution, or not one
+            solution = analytic.solution(p, Case(found["case"][k]))
+            known = [name not in solution.family for name in VARIABLES]
+            theory[:, k] = np.where(known, solution.state, math.nan)
     found |= {f"{name}_theory": values for name, values in zip(VARIABLES, theory, strict=True)}
     return found | {"run": np.array([str(shown / name) for name in found["run"].tolist()])}
 
@@ -207,25 +198,20 @@ def save_means(runs: Mapping[str, Trajectory], path: Path) -> None:
 
 def _means(runs: Mapping[str, Trajectory]) -> Columns:
     """Parameters, means with drifts, last case of runs; nan and -1 if short."""
-    rows = []
+    rows, unknown = [], [math.nan] * len(VARIABLES)
     for name, run in runs.items():
-        row: dict[str, Any] = {"run": name, "engine": run.header.engine} | dataclasses.asdict(
-            run.header.parameters
-        )
-        row |= {
-            "duration": float(run.time[-1]) if len(run.time) else 0.0,
-            "failure": run.header.failure,
-        }
-        means = steady.last_quarter(run.time, run.x, run.header, len(run.time))
-        means = means or ([math.nan] * len(VARIABLES), [math.nan] * len(VARIABLES))
+        about = run.header
+        row: dict[str, Any] = {"run": name, "engine": about.engine}
+        row |= dataclasses.asdict(about.parameters)
+        row["duration"] = float(run.time[-1]) if len(run.time) else 0.0
+        row["failure"] = about.failure
+        means = steady.last_quarter(run.time, run.x, about, len(run.time)) or (unknown, unknown)
         for variable, mean, drift in zip(VARIABLES, *means, strict=True):
             row |= {variable: mean, f"{variable}_uncertainty": drift}
-        row |= {
-            "case": int(settled_case(run)) if len(run.case) else -1,
-            "steady": run.header.flow.is_steady,
-        }
-        about = run.header.attributes() | {"mjcf": run.header.mjcf, "created": "", "failure": ""}
-        row["identity"] = _digest(json.dumps(about, sort_keys=True).encode())
+        row["case"] = int(settled_case(run)) if len(run.case) else -1
+        row["steady"] = about.flow.is_steady
+        determined_by = about.attributes() | {"mjcf": about.mjcf, "created": "", "failure": ""}
+        row["identity"] = _digest(json.dumps(determined_by, sort_keys=True).encode())
         row["numbers"] = _digest(*(getattr(run, each).tobytes() for each in columns(Trajectory)))
         rows.append(row)
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}
@@ -233,10 +219,7 @@ def _means(runs: Mapping[str, Trajectory]) -> Columns:
 
 def _digest(*parts: bytes) -> str:
     """A hash of bytes, 32 hexadecimal digits."""
-    digest = hashlib.sha256()
-    for part in parts:
-        digest.update(part)
-    return digest.hexdigest()[:32]
+    return hashlib.sha256(b"".join(parts)).hexdigest()[:32]
 
 
 def _attributes() -> dict[str, dict[str, Any]]:
@@ -245,24 +228,21 @@ def _attributes() -> dict[str, dict[str, Any]]:
         f.name: {"units": f.metadata["unit"], "long_name": f.metadata["meaning"]}
         for f in Parameters.quantities()
     }
-    texts = {"run": "file and name of the run", "engine": "engine", "drag": "law of drag"}
-    about |= {
-        name: {"long_name": text}
-        for name, text in (texts | {"failure": "why it broke down"}).items()
-    }
+    about["run"] = {"long_name": "file and name of the run"}
+    about["engine"] = {"long_name": "engine"}
+    about["drag"] = {"long_name": "law of drag"}
+    about["failure"] = {"long_name": "why it broke down"}
     about["duration"] = {"units": "s", "long_name": "duration of the run"}
     stored = columns(Trajectory)
+    told = {
+        "": "mean",
+        "_uncertainty": "uncertainty of the mean",
+        "_theory": "stationary solution of the case",
+    }
     for name in VARIABLES:
-        units, meaning = (stored[name][key] for key in ("units", "long_name"))
-        about[name] = {"units": units, "long_name": f"{meaning}, mean"}
-        about[f"{name}_uncertainty"] = {
-            "units": units,
-            "long_name": f"{meaning}, uncertainty of the mean",
-        }
-        about[f"{name}_theory"] = {
-            "units": units,
-            "long_name": f"{meaning}, stationary solution of the case",
-        }
+        units, meaning = stored[name]["units"], stored[name]["long_name"]
+        for ending, what in told.items():
+            about[name + ending] = {"units": units, "long_name": f"{meaning}, {what}"}
     about["case"] = attributes(stored["case"])  # -1: none prevails
     return about
 
@@ -274,13 +254,6 @@ def varied_parameters(of: Mapping[str, npt.NDArray[Any]]) -> list[str]:
         for f in dataclasses.fields(Parameters)
         if f.name in of and len(np.unique(of[f.name])) > 1
     ]
-
-
-def describe(path: Path) -> dict[str, Any]:
-    """What a collection or batch holds: names of runs, engines, failures, the range of every
-    column, JSON-able; empty for a file that holds a single run. Errors as of `read`."""
-    of = read(path)
-    return described(of) if of else {}
 
 
 def read(path: Path) -> Columns:
@@ -300,13 +273,8 @@ def read(path: Path) -> Columns:
             of, run = {name: column(dataset(file, name)) for name in file}, dataset(file, "run")
             if not run.is_scale:  # a grid
                 names = [next(iter(dimension.keys())) for dimension in run.dims]
-                of |= dict(
-                    zip(
-                        names,
-                        np.meshgrid(*(of[name] for name in names), indexing="ij"),
-                        strict=True,
-                    )
-                )
+                places = np.meshgrid(*(of[name] for name in names), indexing="ij")
+                of |= dict(zip(names, places, strict=True))
             return {name: values.ravel() for name, values in of.items()}
     if schema not in (MEANS, storage.BATCH):
         return {}
@@ -359,8 +327,9 @@ def _parameters(of: Columns, k: int) -> Parameters:
     return Parameters(**{name: of[name][k : k + 1].tolist()[0] for name in names})
 
 
-def described(of: dict[str, npt.NDArray[Any]]) -> dict[str, Any]:
-    """What the columns of a collection hold, as `describe` gives it."""
+def describe(of: Columns) -> dict[str, Any]:
+    """What a collection or batch holds: names of runs, engines, failures, the range of every
+    column, JSON-able."""
     codes, counts = np.unique(of["case"], return_counts=True)
     finite = {
         name: values[np.isfinite(values)] for name, values in of.items() if values.dtype.kind == "f"

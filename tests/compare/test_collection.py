@@ -67,7 +67,7 @@ def test_the_varied_parameters_of_a_grid_are_dimensions(grid, tmp_path):
         )
         assert np.isfinite(data.omega_c).all()
         assert set(data.mu.values.flat) == {P.mu}
-    about = collection.describe(tmp_path / "all.h5")
+    about = collection.describe(collection.read(tmp_path / "all.h5"))
     assert about["varied"] == ["eta", "omega_0"]
     assert about["ranges"]["omega_0"] == [min(OMEGAS), max(OMEGAS)]
     assert len(about["names"]) == 6
@@ -82,18 +82,18 @@ def test_the_varied_parameters_of_other_runs_are_coordinates(runs, tmp_path):
         assert data.omega_0.dims == ("run",)
         pairs = list(zip(data.eta.values.tolist(), data.omega_0.values.tolist(), strict=True))
         assert pairs == sorted(pairs)  # whatever the files are called
-    assert collection.describe(tmp_path / "all.h5")["varied"] == ["eta", "omega_0"]
+    assert collection.describe(collection.read(tmp_path / "all.h5"))["varied"] == ["eta", "omega_0"]
 
 
 def test_the_law_of_drag_is_kept(tmp_path):
     runs = ran(tmp_path / "runs", [P, P.replace(drag="quadratic", nu_f=1e-6)])
     collection.collect(runs, tmp_path / "all.h5")
-    about = collection.describe(tmp_path / "all.h5")
+    about = collection.describe(collection.read(tmp_path / "all.h5"))
     assert (about["drag"], about["varied"]) == (["quadratic", "stokes"], ["nu_f", "drag"])
     assert collection.shown(about).row_count == 7
     with reading(tmp_path / "all.h5") as file:
         older = {name: column(dataset(file, name)) for name in file if name != "drag"}
-    assert collection.described(older)["varied"] == ["nu_f"]
+    assert collection.describe(older)["varied"] == ["nu_f"]
 
 
 def test_theory_stands_beside_what_was_measured(tmp_path):
@@ -145,7 +145,7 @@ def test_a_batch_is_described_like_a_collection_and_its_runs_are_named(tmp_path,
         of_one = json.loads(told(capsys, f"inspect {name} --json"))
         assert of_one["parameters"]["omega_0"] == omega_0
     assert collection.collect(tmp_path / "runs", tmp_path / "all.h5") == 3
-    names = collection.describe(tmp_path / "all.h5")["names"]
+    names = collection.describe(collection.read(tmp_path / "all.h5"))["names"]
     assert [str(tmp_path / "runs" / name) for name in names] == about["names"]
 
 
@@ -173,7 +173,7 @@ def test_means_alone_make_the_same_collection_in_any_number_of_processes(
                 found.add(repr({each: column(dataset(file, each)).tolist() for each in file}))
     assert len(found) == 1
     assert sizes[1] < sizes[0] / 3
-    assert collection.describe(min(files))["varied"] == ["eta", "omega_0"]
+    assert collection.describe(collection.read(min(files)))["varied"] == ["eta", "omega_0"]
     said = refused(capsys, f"{sweep} -o {tmp_path / 'means'}")
     assert "holds another sweep (means_only = True, not False)" in said
 

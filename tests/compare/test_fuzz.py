@@ -98,6 +98,11 @@ def mutants(good, seed, count):
     return (mutated(good, rng) for _ in range(count))
 
 
+def described(path):
+    gathered = collection.read(path)
+    return collection.describe(gathered) if gathered else {}
+
+
 @ENOUGH
 @pytest.mark.parametrize(
     ("kind", "read"),
@@ -106,8 +111,8 @@ def mutants(good, seed, count):
         ("theory", lambda path: list(storage.parts(path, 400))),
         ("batch", storage.contents),
         ("batch", storage.load_runs),
-        ("collection", collection.describe),
-        ("means", collection.describe),
+        ("collection", described),
+        ("means", described),
         ("means", storage.contents),
         ("measurements", record.load),
     ],
