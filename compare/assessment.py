@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property, reduce
+from dataclasses import replace
+from functools import reduce
 from operator import or_
 from statistics import median
 
@@ -20,7 +20,7 @@ from compare.convergence import Ends, zero_step_limits
 from compare.judge import checks_of, inconclusive_criteria, lost_to, outcome, per_criterion, verdict
 from compare.kit.engines import Engine, engine
 from compare.kit.quantities import quantity
-from compare.kit.record import Check, Measurement, Missing, Records, RecordsByEngine, Relation
+from compare.kit.record import Check, Missing, Records, RecordsByEngine, Relation
 from compare.kit.runner import coarse_step
 
 USUAL_STEP = 2e-3
@@ -63,29 +63,39 @@ def assess(
 
     Nothing, where theory breaks down, or no protocol of the claim was asked of it. Else it leaves
     the claim inconclusive where too few of its numbers can tell; without a limit none can."""
-    given = _Given(claim, steps)
+    planned = [
+        (n, row)
+        for n, own in sorted(steps.items())
+        for row in own.rows
+        if row.protocol in claim.protocols
+    ]
+    finest = {row.protocol: n for n, row in planned}
+    asked = {(row.protocol, row.set) for _, row in planned}
+    lost = [each for own in steps.values() for each in lost_to(claim, own)]
+    missing = lost + [
+        row for n, row in planned if isinstance(row, Missing) and n == finest[row.protocol]
+    ]
     try:
         found = {n: checks_of(claim, own) for n, own in steps.items()}
     except Exception as error:  # a theory that breaks down loses its claim, whoever measured
         reason = f"{type(error).__name__}: {error}"
         return EngineVerdict(engine=by.name, outcome=Outcome.ERROR, reason=reason)
     shared = {
-        (c.criterion, m.set) for c in trial if ((m := c.measurement).protocol, m.set) in given.asked
+        (c.criterion, m.set) for c in trial if ((m := c.measurement).protocol, m.set) in asked
     }
     if not shared and not any(found.values()):
         why = "at this level nothing that bears on the claim was asked of it"
-        reason = "; ".join([why, *map(str, given.missing[:SEVERAL])])
+        reason = "; ".join([why, *map(str, missing[:SEVERAL])])
         return EngineVerdict(engine=by.name, outcome=Outcome.NOT_ASKED, reason=reason)
     if by.relative_tolerance:
         checks, orders = _loosened(found[max(found)], by.relative_tolerance), []
     else:
-        limits = zero_step_limits(found, given.finest, ends)
+        limits = zero_step_limits(found, finest, ends)
         checks = tuple(check for check, _ in limits)
         orders = [order for _, order in limits if math.isfinite(order)]
     most = reduce(or_, map(per_criterion, found.values()))
     wanted = most | Counter(n for n, _ in shared) | Counter({check.criterion for check in trial})
-    lost = given.lost
-    few = _too_few(claim, checks, wanted, given.missing)
+    few = _too_few(claim, checks, wanted, missing)
     usual = (
         c
         for n, each in found.items()
@@ -99,49 +109,8 @@ def assess(
         checks=checks,
         order=median(orders) if orders else math.nan,
         deviations=_deviations(usual),
-        left_out=sum(each.rows for each in given.missing) + most.total() - len(checks),
+        left_out=sum(each.rows for each in missing) + most.total() - len(checks),
     )
-
-
-@dataclass(frozen=True)
-class _Given:
-    """What an engine has measured for a claim, and what is missing."""
-
-    claim: Claim
-    steps: Mapping[int, Records]
-
-    @cached_property
-    def rows(self) -> list[tuple[int, Measurement | Missing]]:
-        """All rows of the claim's protocols, each with its step divisor, the coarsest first."""
-        protocols = self.claim.protocols
-        steps = sorted(self.steps.items())
-        return [(n, row) for n, own in steps for row in own.rows if row.protocol in protocols]
-
-    @cached_property
-    def finest(self) -> dict[str, int]:
-        """The largest step divisor of each protocol."""
-        return {row.protocol: n for n, row in self.rows}
-
-    @cached_property
-    def asked(self) -> set[tuple[str, str]]:
-        """The protocols that it carried out, with their sets."""
-        return {(row.protocol, row.set) for _, row in self.rows}
-
-    @cached_property
-    def lost(self) -> list[Missing]:
-        """What is gone of its numbers, though no protocol said why."""
-        return [each for own in self.steps.values() for each in lost_to(self.claim, own)]
-
-    @cached_property
-    def missing(self) -> list[Missing]:
-        """That, and what its protocols left out with their finest step."""
-        named = [
-            row for n, row in self.rows if isinstance(row, Missing) and self._is_finest(n, row)
-        ]
-        return self.lost + named
-
-    def _is_finest(self, divisor: int, row: Missing) -> bool:
-        return self.finest[row.protocol] == divisor
 
 
 def _loosened(checks: Sequence[Check], share: float) -> tuple[Check, ...]:

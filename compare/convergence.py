@@ -61,6 +61,9 @@ LEAST_STEPS = 3
 """Time steps with which a number must have been measured to have a limit."""
 Ends = Set[tuple[str, float]]
 """Measured thresholds, each with the name of its set."""
+Alike = tuple[str, int, str, tuple[tuple[str, str], ...]]
+"""What checks of one thing with different steps share: protocol, criterion, set, and all
+conditions that are no numbers."""
 Limit = tuple[Check, float]
 """A check in the zero-step limit, and the observed order, nan where the step shows nothing."""
 
@@ -233,9 +236,9 @@ def series_by_step(
     groups: dict[Alike, dict[int, list[Check]]] = {}
     for divisor in sorted(found):
         for check in found[divisor]:
-            groups.setdefault(Alike.of(check), {}).setdefault(divisor, []).append(check)
-    for kind, by_divisor in groups.items():
-        if (last := finest[kind.protocol]) not in by_divisor:
+            groups.setdefault(_shared(check), {}).setdefault(divisor, []).append(check)
+    for (protocol, *_), by_divisor in groups.items():
+        if (last := finest[protocol]) not in by_divisor:
             continue
         ones = by_divisor.pop(last)
         coarser: list[list[tuple[int, Check]]] = [[] for _ in ones]
@@ -247,21 +250,11 @@ def series_by_step(
             yield StepSeries(divisors, checks)
 
 
-@dataclass(frozen=True)
-class Alike:
-    """What checks of one thing with different steps share: all but numeric conditions."""
-
-    protocol: str
-    criterion: int
-    set: str
-    texts: tuple[tuple[str, str], ...]
-
-    @classmethod
-    def of(cls, check: Check) -> Alike:
-        """What a check shares with those of the same thing with other steps."""
-        m = check.measurement
-        texts = sorted((name, v) for name, v in m.at.items() if isinstance(v, str))
-        return cls(m.protocol, check.criterion, m.set, tuple(texts))
+def _shared(check: Check) -> Alike:
+    """What a check shares with those of the same thing with other steps."""
+    m = check.measurement
+    texts = sorted((name, v) for name, v in m.at.items() if isinstance(v, str))
+    return m.protocol, check.criterion, m.set, tuple(texts)
 
 
 def _pair_nearest(ones: Sequence[Check], others: Sequence[Check]) -> Iterator[tuple[int, int]]:

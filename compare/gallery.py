@@ -94,17 +94,15 @@ def _draw_points(axes: Axes, checks: Checks, names: Sequence[str], engines: Sequ
     engine = np.array([engines.index(c.measurement.engine) for c in checks])
     # Points are spread vertically against overlap; a single point stays centred.
     kind = row * len(engines) + engine
-    spread = np.where(
-        np.bincount(kind)[kind] == 1, 0.0, (np.arange(len(row)) * 0.618 + 0.5) % 1 - 0.5
-    )
+    alone = np.bincount(kind)[kind] == 1
+    spread = np.where(alone, 0.0, (np.arange(len(row)) * 0.618 + 0.5) % 1 - 0.5)
     lanes = row + 1 / len(engines) * (engine + 0.5 + 0.6 * spread) - 0.5
     parts = np.clip([abs(c.deviation) / c.tolerance for c in checks], *_FRAME)
     agrees = np.array([c.agrees for c in checks])
     size: dict[str, Any] = {"ms": 3, "mfc": "none"} if len(checks) > _MANY else {"ms": 4.5}
     for k, name in enumerate(engines):
-        look: dict[str, Any] = (
-            {"label": name, "ls": "none", "clip_on": False} | style.mark_of(name) | size
-        )
+        look: dict[str, Any] = {"label": name, "ls": "none", "clip_on": False}
+        look |= style.mark_of(name) | size
         for own, bad in ((agrees, {}), (~agrees, {"color": style.FORCE, "label": f"_{name}"})):
             own = own & (engine == k)
             axes.plot(parts[own], lanes[own], **look | bad)
@@ -115,16 +113,13 @@ def _place(axes: Axes, height: float, above: float) -> None:
 
     By hand: there are so many of these figures that a solver of layouts would cost more than
     drawing them."""
-    widths = [
-        text_to_path.get_text_width_height_descent(
-            label.get_text(), label.get_fontproperties(), "$" in label.get_text()
-        )[0]
-        for label in axes.get_yticklabels()
-    ]
+    measure, widths = text_to_path.get_text_width_height_descent, []
+    for label in axes.get_yticklabels():
+        text = label.get_text()
+        widths.append(measure(text, label.get_fontproperties(), "$" in text)[0])
     left = 0.15 + max(widths) / 72  # points
-    axes.set_position(
-        (left / _WIDTH, _BELOW / height, 1 - (left + 0.16) / _WIDTH, 1 - (_BELOW + above) / height)
-    )
+    wide, high = _WIDTH - left - 0.16, height - _BELOW - above
+    axes.set_position((left / _WIDTH, _BELOW / height, wide / _WIDTH, high / height))
 
 
 def _told_of(every: Checks, checks: Checks, engines: Sequence[str]) -> str:
@@ -165,9 +160,8 @@ def write(
     Raises `InputError` for an unknown format, `StorageError` if a file can't be written."""
     for suffix in formats:
         if suffix not in FORMATS:
-            raise InputError(
-                f"no figure can be written as {suffix!r}; there are {', '.join(FORMATS)}"
-            )
+            known = ", ".join(FORMATS)
+            raise InputError(f"no figure can be written as {suffix!r}; there are {known}")
     make_directory(output)
     captions = []
     for name, data in selected.items():
@@ -208,9 +202,8 @@ def pictures(
     new.reverse()  # the last ones take longest
     for (path, *_), found in zip(new, spread(drawn, new), strict=True):
         figures[path.stem] |= found
-    made, letters = embedded(
-        {name: each["picture"] for name, each in figures.items() if not each["gap"]}
-    )
+    drawings_there = {name: of["picture"] for name, of in figures.items() if not of["gap"]}
+    made, letters = embedded(drawings_there)
     for name, picture in made.items():
         figures[name]["picture"] = picture
     return figures, letters

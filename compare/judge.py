@@ -95,20 +95,12 @@ def verdict(claim: Claim, records: Records) -> Verdict:
         # a theory that breaks down, in whatever way, loses its claim and no other
         reason = f"{type(error).__name__}: {error}"
         return Verdict(claim=claim, outcome=Outcome.ERROR, error=reason, missing=missing)
-    if (
-        not checks
-        and not missing
-        and (known := {m.protocol for m in records.measurements} & claim.protocols)
-    ):
-        missing = tuple(
-            Missing(name, "all sets", "no number bears on the claim", 0) for name in sorted(known)
-        )
-    return Verdict(
-        claim=claim,
-        outcome=outcome(claim, checks, per_criterion(checks), lost),
-        checks=checks,
-        missing=missing,
-    )
+    if not checks and not missing:
+        known = sorted({m.protocol for m in records.measurements} & claim.protocols)
+        why = "no number bears on the claim"
+        missing = tuple(Missing(name, "all sets", why, 0) for name in known)
+    said = outcome(claim, checks, per_criterion(checks), lost)
+    return Verdict(claim=claim, outcome=said, checks=checks, missing=missing)
 
 
 def outcome(

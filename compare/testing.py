@@ -73,10 +73,8 @@ class Series:
     def __getitem__(self, quantity: str) -> Array:
         """A quantity (n,); raises `InputError` for one that it doesn't have."""
         if quantity not in self.values:
-            hint = suggestion(quantity, self.values)
-            raise InputError(
-                f"{self.name} has no {quantity}{hint}; it has {', '.join(self.values)}"
-            )
+            hint, known = suggestion(quantity, self.values), ", ".join(self.values)
+            raise InputError(f"{self.name} has no {quantity}{hint}; it has {known}")
         return self.values[quantity]
 
 
@@ -108,9 +106,7 @@ def read(source: Source, name: str = "") -> Series:
             source = _hdf5(path)
     if isinstance(source, Trajectory):
         run = source
-        given: dict[str, npt.ArrayLike] = {
-            quantity: component(run, quantity) for quantity in COMPONENTS
-        }
+        given: dict[str, npt.ArrayLike] = {name: component(run, name) for name in COMPONENTS}
     else:
         given = dict(source) if isinstance(source, Mapping) else {}
     name = name or (run.header.engine if run else "the motion")
@@ -158,19 +154,15 @@ def _hdf5(path: Path) -> Trajectory | dict[str, Array]:
         ours = error
     with reading(path, sealed=False) as file:
         if "schema" not in file.attrs:
-            found = {
-                name: dataset(file, name) for name in ("t", *UNITS) if file.get(name, getlink=True)
-            }
+            names = [name for name in ("t", *UNITS) if file.get(name, getlink=True)]
+            found = {name: dataset(file, name) for name in names}
             for name, stored in found.items():
                 if stored.dtype.kind not in "fiu" or len(stored.shape or ()) != 1:
                     raise StorageError(f"{name!r} is no column of numbers")
                 if len(stored) > SAMPLES:
                     most = f"{SAMPLES:g} are the most that are compared"
                     raise StorageError(f"{name!r} has {len(stored):g} samples, and {most}")
-            return {
-                name: _column("time" if name == "t" else name, stored)
-                for name, stored in found.items()
-            }
+            return {n: _column("time" if n == "t" else n, stored) for n, stored in found.items()}
     raise ours
 
 
@@ -295,8 +287,7 @@ def assert_settles(
     if isinstance(case, str) and case not in Case.__members__:
         raise InputError(f"there is no case {case!r}; there are {', '.join(Case.__members__)}")
     lasting = analytic.stable_solutions(p, sinking=True) if p.c else []
-    stays = [s for s in lasting if not s.moves]
-    states = stays
+    states = [s for s in lasting if not s.moves]
     if case is not None:
         states = [analytic.solution(p, Case[case] if isinstance(case, str) else case)]
     if not states or not p.c:
@@ -317,24 +308,20 @@ def assert_settles(
     slowest = time_constant(p, state)
     lasts, swing = float(motion.time[-1] - motion.time[0]), float(np.ptp(w))
     scale, off = abs(exact) or rotation_scale(p), np.abs(w - exact)
-    needed = (
-        slowest
-        * (max(3.0, -math.log(rtol)) if off.max() > rtol * scale < swing else 3.0)
-        / (1 - SETTLED_PART)
-    )
+    still_moves = off.max() > rtol * scale < swing
+    time_constants = max(3.0, -math.log(rtol)) if still_moves else 3.0
+    needed = time_constants * slowest / (1 - SETTLED_PART)
     if lasts < needed:
         raise InputError(
             f"the motion is too short to judge: it lasts {lasts:.3g} s and should last "
             f"{needed:.3g} s, since to forget "
             f"its start takes the ball time constants of {slowest:.3g} s"
         )
-    elsewhere = [
-        s.case.name for s in lasting if np.all(np.abs(w - s.state.omega_c) <= rtol * scale)
-    ]
+    near = (s.case.name for s in lasting if np.all(np.abs(w - s.state.omega_c) <= rtol * scale))
     k = int(off.argmax())
     assert off[k] <= rtol * scale, (
         f"the ball does not settle in {name}: for the last {SETTLED_PART * lasts:.3g} s omega_c "
         f"should be within {rtol:g} of {exact:.8g} rad/s. It is off by {off[k] / scale:.2e} at t "
         f"= {t[k]:g} s (on average {w.mean():.8g} rad/s; it swings by {swing:.1e} rad/s)"
-        + "".join(f"; it settles in {other}" for other in elsewhere[:1])
+        + "".join(f"; it settles in {other}" for other in [*near][:1])
     )

@@ -103,16 +103,12 @@ class Study:
 
     def jobs(self, campaign: Campaign, protocols: Sequence[Protocol] | None = None) -> list[Job]:
         """Every protocol by every engine with every step that is planned."""
-        runners = [
-            Runner(campaign, each, self.level, divisor)
+        return [
+            Job(protocol, Runner(campaign, each, self.level, divisor), self.output, self.sets)
             for each in self.engines
             for divisor in each.divisors
-        ]
-        return [
-            Job(protocol, runner, self.output, self.sets)
-            for runner in runners
             for protocol in protocols or self.protocols
-            if planned(protocol.name, runner.engine, runner.divisor, runner.level)
+            if planned(protocol.name, each, divisor, self.level)
         ]
 
     def files(self, campaign: Campaign) -> results.Files:
@@ -225,15 +221,12 @@ def judge_stored(
     stored.cache_clear()
     forget()
     records = stored(directory)  # what can't be read is said before anything is judged
-    with processes(workers) as work:  # the last claims first: they take longest
-        found = work.map(partial(_judged, directory), range(len(CLAIMS) - 1, -1, -1))
-        verdicts = {
-            claim.id: Verdict(claim=claim, **each)
-            for claim, each in zip(CLAIMS[::-1], found, strict=True)
-        }
-        written = write(
-            directory, Level[summary.level], summary.measurements, records, verdicts, work.map
-        )
+    with processes(workers) as work:
+        last_first = range(len(CLAIMS) - 1, -1, -1)  # they take longest
+        found = zip(last_first, work.map(partial(_judged, directory), last_first), strict=True)
+        verdicts = {CLAIMS[n].id: Verdict(claim=CLAIMS[n], **each) for n, each in found}
+        level, files = Level[summary.level], summary.measurements
+        written = write(directory, level, files, records, verdicts, work.map)
     return [v for v in written if v.claim.id in chosen]
 
 

@@ -65,10 +65,8 @@ class Storing:
 
     def store(self, runs: Mapping[str, Trajectory]) -> Path:
         """Write whole runs, by key, into a file named by all of them."""
-        path = (
-            self.directory
-            / f"{self.label}-{hashlib.sha256(' '.join(runs).encode()).hexdigest()[:24]}.h5"
-        )
+        digest = hashlib.sha256(" ".join(runs).encode()).hexdigest()[:24]
+        path = self.directory / f"{self.label}-{digest}.h5"
         self.save(runs, path)
         return path
 
@@ -136,10 +134,8 @@ class Campaign:
                 version, keys = storage.contents(file) if name[1] else ("", [])
             except StorageError as error:
                 file.replace(file.with_suffix(".damaged"))
-                print(
-                    f"dualball: {error}; it is set aside, its runs are carried out again",
-                    file=sys.stderr,
-                )
+                what = f"{error}; it is set aside, its runs are carried out again"
+                print(f"dualball: {what}", file=sys.stderr)
                 continue
             others += version != ours
             if version == ours:
@@ -210,13 +206,10 @@ class Campaign:
 
         The directory's `FAILURES` lists all that have failed in this campaign, for programs."""
         unique = {task.key: task for task in tasks}
-        todo = [
-            task for key, task in unique.items() if key not in self._files and key not in self._read
-        ]
-        earlier = [
-            key for key in unique if key in self._files and self._files[key].name.endswith(_BROKEN)
-        ]
-        failures = [Failure(unique[key], self.load(key).header.failure) for key in earlier]
+        todo = [unique[key] for key in unique if key not in self._files and key not in self._read]
+        stored = [key for key in unique if key in self._files]
+        broken = [key for key in stored if self._files[key].name.endswith(_BROKEN)]
+        failures = [Failure(unique[key], self.load(key).header.failure) for key in broken]
         done = len(unique) - len(todo) - len(failures)
         self.report(self.doing, done, len(unique), len(failures))
         for batch, outcomes in self._carry_out(todo):
@@ -225,17 +218,14 @@ class Campaign:
                 done += not reason
                 if file:
                     self._files[task.key] = file
-            self._keep_in_memory(
-                {task.key: run for task, (*_, run) in zip(batch, outcomes, strict=True) if run}
-            )
+            both = zip(batch, outcomes, strict=True)
+            self._keep_in_memory({task.key: run for task, (*_, run) in both if run})
             self.report(self.doing, done, len(unique), len(failures))
         with self._lock:  # the parts of a campaign share the list
-            if new := {
-                failure.task.key: failure
-                for failure in failures
-                if failure.task.key not in self._failed
-            }:
-                self._failed |= new
+            known = len(self._failed)
+            for failure in failures:
+                self._failed.setdefault(failure.task.key, failure)
+            if len(self._failed) > known:
                 failed = [failure.described() for failure in self._failed.values()]
                 write_text(self.directory / FAILURES, json.dumps(failed, indent=1))
         return failures

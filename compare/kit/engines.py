@@ -130,13 +130,6 @@ def plain(step: float) -> ContactSettings:
     return ContactSettings.for_problem(rough, step, STUDY_SLIP, integrator="implicit")
 
 
-def default_settings(step: float) -> ContactSettings:
-    """MuJoCo's own contact parameters on the joints of this study."""
-    return ContactSettings(
-        timestep=step, solref=(0.02, 1.0), solreffriction=0.02, solimp=0.9, impratio=1.0
-    )
-
-
 def _unwarned(*given: Any, **more: Any) -> mjsim.Run:
     """`mjsim.Run` without its warnings."""
     with warnings.catch_warnings():
@@ -158,12 +151,10 @@ def _event_settings(given: Mapping[str, float], p: Parameters) -> analytic.Setti
 
 def _theory(method: str, task: Any, progress: Callable[[float], None]) -> Trajectory:
     """A run by a method of theory, as far as it came."""
-    run = (task.parameters, task.x0, task.t_end, task.fluid)
-    settings = replace(task.settings, method=method)
+    settings, interval = replace(task.settings, method=method), task.sample_interval
+    run = task.parameters, task.x0, task.t_end, task.fluid, settings
     try:
-        return analytic.simulate(
-            *run, settings, sample_interval=task.sample_interval, progress=progress
-        )
+        return analytic.simulate(*run, sample_interval=interval, progress=progress)
     except SimulationError as error:
         there: Trajectory = error.trajectory
         return there

@@ -73,9 +73,8 @@ class Job:
         """What is measured, by name."""
         if self.chosen is not None:
             return self.chosen
-        return planned(
-            self.protocol.name, self.runner.engine, self.runner.divisor, self.runner.level
-        )
+        by = self.runner
+        return planned(self.protocol.name, by.engine, by.divisor, by.level)
 
     @property
     def by(self) -> Engine:
@@ -96,19 +95,16 @@ class Job:
     def origin(self) -> Origin:
         """Who measures, and by which plan."""
         subject, measure, _ = self.protocol.measure.__module__.partition(".measure")
-        plan = [
-            self.by.name,
-            self.runner.divisor,
-            self.runner.level.name,
-            {name: asdict(p) for name, p in self.sets.items()},
-            sources(*self.by.sources, "compare.kit", *([subject + measure] if measure else [])),
-        ]
+        code = sources(*self.by.sources, "compare.kit", *([subject + measure] if measure else []))
+        step, level = self.runner.divisor, self.runner.level.name
+        sets = {name: asdict(p) for name, p in self.sets.items()}
+        plan = [self.by.name, step, level, sets, code]
         return Origin(
             protocol=self.protocol.name,
             engine=self.runner.engine.name,
             by=self.by.name,
-            step=self.runner.divisor,
-            level=self.runner.level.name,
+            step=step,
+            level=level,
             plan=hashlib.sha256(json.dumps(plan).encode()).hexdigest()[:16],
         )
 
@@ -140,16 +136,13 @@ def run(jobs: Sequence[Job]) -> Iterator[tuple[Job, Records | Exception]]:
     if not jobs:
         return
     known = {job.name: job for job in jobs}
-    needs = {}
+    needs = dict[str, list[str]]()
     for name, job in known.items():
-        needs[name] = [
-            other if other in known else job.beside(other) for other in job.protocol.needs
-        ]
+        others = [n if n in known else job.beside(n) for n in job.protocol.needs]
         if PLAN[job.protocol.name].seeded and name != job.protocol.name:
-            needs[name].append(job.protocol.name)
-    order = TopologicalSorter(
-        {name: [each for each in those if each in known] for name, those in needs.items()}
-    )
+            others.append(job.protocol.name)
+        needs[name] = [other for other in others if other in known]
+    order = TopologicalSorter(needs)
     order.prepare()
     found: dict[str, Records] = {}
     broken: dict[str, Exception] = {}
@@ -165,9 +158,7 @@ def run(jobs: Sequence[Job]) -> Iterator[tuple[Job, Records | Exception]]:
                         future = Future[Records]()
                         future.set_exception(lost[0])
                     else:
-                        before = sum(
-                            (found[other] for other in needs[job.name] if other in found), Records()
-                        )
+                        before = sum((found[other] for other in needs[job.name]), Records())
                         future = pool.submit(carry_out, job, before)
                     running[future] = job.name
                 for future in first_done(running):
@@ -223,9 +214,8 @@ def carry_out(job: Job, before: Records) -> Records:
             asked = [name for name in job.sets if not entry.only or name in entry.trial]
             silent = (Planned(protocol.name, name, "") for name in asked if name not in said)
             records = replace(records, planned=records.planned + Counter(silent))
-        campaign.keep(
-            {run.rpartition("/")[2] for m in records.measurements for run in m.runs if "/" in run}
-        )
+        drawn = (run for m in records.measurements for run in m.runs if "/" in run)
+        campaign.keep({run.rpartition("/")[2] for run in drawn})
         record.save(records, path, asdict(job.origin))
     campaign.reduce()
     return record.load(path, **asdict(job.origin))

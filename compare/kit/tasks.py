@@ -203,10 +203,6 @@ def sources(*names: str) -> str:
         top = Path(spec.origin)
         for path in sorted(top.parent.rglob("*")) if spec.submodule_search_locations else [top]:
             if path.suffix in (".py", ".xml"):
-                digest.update(
-                    path.relative_to(top.parent).as_posix().encode()
-                    + b"\0"
-                    + path.read_bytes()
-                    + b"\0"
-                )
+                place = path.relative_to(top.parent).as_posix()
+                digest.update(b"%s\0%s\0" % (place.encode(), path.read_bytes()))
     return digest.hexdigest()

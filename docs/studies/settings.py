@@ -24,7 +24,6 @@ from compare.kit.engines import (
     MUJOCO,
     PLAIN,
     AnySettings,
-    default_settings,
     plain,
 )
 from compare.kit.pages import Rows
@@ -118,6 +117,13 @@ def contestants(ways: Ways) -> list[Contestant]:
         Contestant(name, engines.get(type(way), DEFAULTS).name, way, way.timestep)
         for name, way in ways.items()
     ]
+
+
+def default_settings(step: float) -> ContactSettings:
+    """MuJoCo's own contact parameters on the joints of the study."""
+    return ContactSettings(
+        timestep=step, solref=(0.02, 1.0), solreffriction=0.02, solimp=0.9, impratio=1.0
+    )
 
 
 def rungs(step: float) -> Ways:

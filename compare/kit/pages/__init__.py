@@ -18,19 +18,17 @@ Rows = Sequence[Sequence[str]]
 """A table: its head, then its body."""
 
 
+_UNITS = {
+    " s-2": "/s²", " s-1": "/s", " m-3": "/m³", "s-1": "1/s", "rad-1": "1/rad",
+    "m2": "m²", "m3": "m³", "rad2": "rad²",
+}  # fmt: skip
+
+
 def readable(unit: str) -> str:
     """A unit of the files as a reader writes it: rad s-1 is rad/s, 1 is nothing."""
-    if unit == "1":
-        return ""
-    for written, read in (
-        (" s-2", "/s²"),
-        (" s-1", "/s"),
-        (" m-3", "/m³"),
-        ("s-1", "1/s"),
-        ("rad-1", "1/rad"),
-    ):
+    for written, read in _UNITS.items():
         unit = unit.replace(written, read)
-    return unit.replace("m2", "m²").replace("m3", "m³").replace("rad2", "rad²")
+    return "" if unit == "1" else unit
 
 
 _SIGNS = {
