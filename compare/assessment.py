@@ -143,10 +143,7 @@ def _too_few(
 
 def _deviations(checks: Iterable[Check]) -> tuple[float, ...]:
     """Sizes of deviations divided by their scales, of checks that show them for sure."""
-    numbers = (
-        c
-        for c in checks
-        if quantity(c.measurement.quantity).resolution and c.relation is Relation.EQUAL
-    )
-    off = (abs(c.deviation / c.scale) for c in numbers if c.scale > 10 * c.tolerance)
+    sure = (c for c in checks if c.relation is Relation.EQUAL and c.scale > 10 * c.tolerance)
+    numbers = (c for c in sure if quantity(c.measurement.quantity).resolution)
+    off = (abs(c.deviation / c.scale) for c in numbers)
     return tuple(each for each in off if math.isfinite(each))

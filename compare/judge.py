@@ -64,12 +64,6 @@ def integrated(value: float, size: float, rtol: float = RTOL) -> Estimate:
     return Estimate(value, rtol * abs(size))
 
 
-def judge(claims: Iterable[Claim], records: Records) -> list[Verdict]:
-    """The verdicts on claims, in their order; each stands for itself."""
-    forget()
-    return [verdict(claim, records) for claim in claims]
-
-
 def forget() -> None:
     """Empty the cache of predictions."""
     _computed.cache_clear()

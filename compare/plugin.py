@@ -54,9 +54,8 @@ def pytest_collection_modifyitems(
         rows = [line.partition("#")[0].split(None, 1) for line in lines]
         known = {row[0]: row[1].strip() if len(row) > 1 else "known to fail" for row in rows if row}
         for name in (each for each in known if each not in own):
-            raise pytest.UsageError(
-                f"{path}: no case is called {name!r}; there are {', '.join(own)}"
-            )
+            there = ", ".join(own)
+            raise pytest.UsageError(f"{path}: no case is called {name!r}; there are {there}")
 
         @functools.cache
         def trial() -> runner.EngineProcess:  # begins with the first case asked for
@@ -98,11 +97,9 @@ class ExactCase(pytest.Item):
             at = ", ".join(
                 f"{e:.2g} at {1e3 * h:g} ms" for e, h in zip(found.errors, found.steps, strict=True)
             )
-            allowed = (
-                f"{self.case.about}: errors, in units of its scales, are {at}; allowed is "
-                f"{TOLERANCE:g}"
-            )
-            pytest.fail(found.failure or allowed, pytrace=False)
+            errors = f"{self.case.about}: errors, in units of its scales, are {at}"
+            said = found.failure or f"{errors}; allowed is {TOLERANCE:g}"
+            pytest.fail(said, pytrace=False)
 
     def reportinfo(self) -> tuple[Path, None, str]:
         """What pytest prints before the dots."""
@@ -114,11 +111,8 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
     rows = [["case", "error", "order", "creep (m/s)", "lost", "cost", ""]]
     for verdict in ("passed", "failed", "xfailed", "xpassed"):
         for report in terminalreporter.stats.get(verdict, []):
-            rows += [
-                [*row, verdict]
-                for name, row in getattr(report, "user_properties", [])
-                if name == _ROW
-            ]
+            properties = getattr(report, "user_properties", [])
+            rows += [[*row, verdict] for name, row in properties if name == _ROW]
     if len(rows) > 1:
         terminalreporter.section(
             "exact cases: error at the shortest step in units of the case's scales"

@@ -7,11 +7,18 @@ import numpy as np
 import numpy.typing as npt
 
 import analytic
-from compare.claim import Claim, Criterion
+from compare.claim import Claim, Criterion, Verdict
+from compare.judge import forget, verdict
 from compare.kit.conditions import Conditions
 from compare.kit.record import Measurement, Records
 from model import Events, Flow, Header, Parameters, Trajectory
 from model.trajectory import SAMPLE
+
+
+def judged(claim: Claim, records: Records) -> Verdict:
+    """The verdict on a claim, of which no prediction is known from before."""
+    forget()
+    return verdict(claim, records)
 
 
 def measured(

@@ -96,7 +96,9 @@ def narrow(runner: Runner, searches: Sequence[Search], careful: bool = True) -> 
     asked.granted_ends()
     if careful:
         asked.ends_with_half_the_step()
-    return asked.brackets
+    failures = [asked.failures.get(search, "") for search in searches]
+    both = zip(asked.brackets, failures, strict=True)
+    return [replace(bracket, failure=failure) for bracket, failure in both]
 
 
 class _Narrowing:
@@ -107,6 +109,8 @@ class _Narrowing:
         self.brackets = [search.bracket for search in searches]
         self.before = list(self.brackets)
         """Those of the round before."""
+        self.failures = dict[Search, str]()
+        """Why a run of a search broke down."""
 
     def rounds(self) -> None:
         """Ask inside all brackets that are too wide, until none is or runs show no more."""
@@ -145,14 +149,14 @@ class _Narrowing:
     def answers(self, asked: Sequence[tuple[int, float]], how: Attempt = USUAL) -> list[Reply]:
         """Carry out a run for each question, the number of a search and a value; those without an
         answer anew for longer."""
-        replies = []
+        replies, searches = [], [self.searches[k] for k, _ in asked]
         tasks = [self.searches[k].task(value, self.brackets[k], how) for k, value in asked]
-        for (k, _), task, run in zip(asked, tasks, self.runner.each(tasks), strict=True):
+        for search, task, run in zip(searches, tasks, self.runner.each(tasks), strict=True):
             if isinstance(run, str):
-                self.brackets[k] = replace(self.brackets[k], failure=run)
+                self.failures[search] = run
                 replies.append(Reply(task, None, None))
             else:
-                replies.append(Reply(task, run, self.searches[k].answer(run)))
+                replies.append(Reply(task, run, search.answer(run)))
         unclear = [n for n, reply in enumerate(replies) if reply.run and reply.answer is None]
         if how is USUAL and unclear:
             longer = self.answers([asked[n] for n in unclear], LONGER)
@@ -172,5 +176,4 @@ def _narrowed(bracket: Bracket, values: Sequence[float], replies: Sequence[Reply
     no = said.index(False, max(undecided, default=yes))
     by = tuple(reply.task for reply in replies[max(yes - 1, 0) : no])
     all_said = *bracket.said, *zip(values, answers, strict=True)
-    ends = shown[yes], shown[no]
-    return replace(bracket, low=places[yes], high=places[no], runs=ends, tasks=by, said=all_said)
+    return Bracket(places[yes], places[no], (shown[yes], shown[no]), by, said=all_said)

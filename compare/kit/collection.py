@@ -266,10 +266,8 @@ def read(path: Path) -> Columns:
         schema, version = (file.attrs.get(name) for name in ("schema", "schema_version"))
         if schema == SCHEMA:
             if not isinstance(version, (int, np.integer)) or not 1 <= version <= SCHEMA_VERSION:
-                raise StorageError(
-                    f"it is a collection of version {version!r}; this program reads "
-                    f"{SCHEMA_VERSION}"
-                )
+                held = f"it is a collection of version {version!r}"
+                raise StorageError(f"{held}; this program reads {SCHEMA_VERSION}")
             of, run = {name: column(dataset(file, name)) for name in file}, dataset(file, "run")
             if not run.is_scale:  # a grid
                 names = [next(iter(dimension.keys())) for dimension in run.dims]

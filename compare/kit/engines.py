@@ -268,10 +268,8 @@ def engine(name: str) -> Engine:
     """The engine of a name, or of its alias `analytic`; `InputError` if there is none."""
     name = "event" if name == "analytic" else name
     if name not in ENGINES:
-        raise InputError(
-            f"no engine is called {name!r}{suggestion(name, ENGINES)}; there are "
-            f"{few(ENGINES, MOST_NAMES)}"
-        )
+        hint, known = suggestion(name, ENGINES), few(ENGINES, MOST_NAMES)
+        raise InputError(f"no engine is called {name!r}{hint}; there are {known}")
     return ENGINES[name]
 
 
@@ -289,13 +287,9 @@ def sliding_speeds(run: Trajectory) -> tuple[Array, Array]:
     if not kept.get("rigid", "solref" not in kept):  # as files of versions before have it
         known = {f.name: kept[f.name] for f in fields(ContactSettings) if f.name in kept}
         settings = ContactSettings.from_mapping(known)
-    friction = (
-        np.hypot(run.force_A[:, 0], run.force_A[:, 2]),
-        np.hypot(run.force_B[:, 1], run.force_B[:, 2]),
-    )
-    A, B = (
-        np.maximum(v - 1.01 * settings.creep_speed(force / m), 0.0)
-        for v, force in zip((run.slip_speed_A, run.slip_speed_B), friction, strict=True)
-    )
+    friction_A = np.hypot(run.force_A[:, 0], run.force_A[:, 2])
+    friction_B = np.hypot(run.force_B[:, 1], run.force_B[:, 2])
+    A = np.maximum(run.slip_speed_A - 1.01 * settings.creep_speed(friction_A / m), 0.0)
+    B = np.maximum(run.slip_speed_B - 1.01 * settings.creep_speed(friction_B / m), 0.0)
     both = (run.force_A[:, 1] > 0) & (run.force_B[:, 0] > 0)
     return np.where(both, np.minimum(A, B), A), np.where(both, np.minimum(A, B), B)

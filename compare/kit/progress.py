@@ -118,14 +118,11 @@ def reporter(quiet: bool = False, counted: bool = False) -> Iterator[Show]:
         def print_progress() -> None:
             while not ended.wait(INTERVAL):
                 what, done, total, failed = last
-                left = f", {pace}" if pace.left() else ""
-                share = f", {done / total:.0%}" if total else ""
-                bad = f", {failed} failed" if failed else ""
-                print(
-                    f"{time.monotonic() - began:.0f} s: {what}{share}{bad}{left}",
-                    file=sys.stderr,
-                    flush=True,
-                )
+                said = f"{time.monotonic() - began:.0f} s: {what}"
+                said += f", {done / total:.0%}" if total else ""
+                said += f", {failed} failed" if failed else ""
+                said += f", {pace}" if pace.left() else ""
+                print(said, file=sys.stderr, flush=True)
 
         thread = threading.Thread(target=print_progress, daemon=True)
         thread.start()

@@ -313,17 +313,16 @@ def load(path: Path, **origin: Any) -> Records:
         parameters = functools.cache(
             lambda *values: Parameters(**dict(zip(_PARAMETERS, values, strict=True)))
         )
+        conditions = {n[3:]: values for n, values in columns.items() if n.startswith("at_")}
+        causes = {n[2:]: values for n, values in columns.items() if n.startswith("u_")}
         rows = []
         for k in range(len(columns["value"])):
-            at = {name[3:]: values[k] for name, values in columns.items() if name.startswith("at_")}
+            at = {name: values[k] for name, values in conditions.items()}
+            budget = {cause: values[k] for cause, values in causes.items()}
             row = Measurement(
                 **{name: columns[name][k] for name in _OWN if name != "unit"},
                 runs=tuple(columns["runs"][k].split()),
-                budget={
-                    name[2:]: values[k]
-                    for name, values in columns.items()
-                    if name.startswith("u_") and values[k] == values[k]
-                },
+                budget={cause: u for cause, u in budget.items() if u == u},
                 parameters=parameters(*(columns[name][k] for name in _PARAMETERS)),
                 at=cast(Conditions, {n: v for n, v in at.items() if v != "" and v == v}),
             )

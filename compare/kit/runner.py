@@ -106,9 +106,8 @@ class Runner:
         failures = self.campaign.complete([task for group in groups for task in group])
         failed = {failure.task.key: failure.reason for failure in failures}
         for group in groups:
-            yield next(
-                (failed[task.key] for task in group if task.key in failed), ""
-            ) or self.campaign.run(group)
+            reasons = [failed[task.key] for task in group if task.key in failed]
+            yield reasons[0] if reasons else self.campaign.run(group)
 
     def each(self, tasks: Sequence[Task]) -> Iterator[Trajectory | str]:
         """The trajectory of every task, one after the other, or why it failed."""

@@ -41,9 +41,8 @@ class Axis:
         name, _, rest = text.partition("=")
         check_names([name], list(units), kind)
         if ":" not in rest:
-            values = tuple(
-                parse_number(name, part, units[name], allowed) for part in rest.split(",")
-            )
+            parts = rest.split(",")
+            values = tuple(parse_number(name, part, units[name], allowed) for part in parts)
             if len(set(values)) < len(values):
                 raise InputError(f"{name} = {rest} names a value twice")
             return cls(name, values)
@@ -56,10 +55,8 @@ class Axis:
             raise InputError(f"{given} is in the wrong order: a range runs from low to high")
         if not count:
             return cls(name, (first, last), between=True)
-        points = int(
-            parse_number(f"count of {name}", count[0], "points", Range(2, MOST, whole=True))
-        )
-        return cls(name, tuple(np.linspace(first, last, points).tolist()))
+        points = parse_number(f"count of {name}", count[0], "points", Range(2, MOST, whole=True))
+        return cls(name, tuple(np.linspace(first, last, int(points)).tolist()))
 
     @classmethod
     def several(cls, texts: Sequence[str], *kind: Any) -> list[Axis]:
@@ -75,10 +72,8 @@ class Axis:
     def points(self) -> tuple[float, ...]:
         """The values; raises `InputError` if only the ends of a range were given."""
         if self.between:
-            raise InputError(
-                f"here {self.name} needs values: write {self.name}=from:to:count or "
-                f"{self.name}=a,b,c"
-            )
+            ways = f"{self.name}=from:to:count or {self.name}=a,b,c"
+            raise InputError(f"here {self.name} needs values: write {ways}")
         return self.values
 
     @property
@@ -113,7 +108,5 @@ def sobol(dimensions: int, count: int, seed: int) -> Array:
     """The first points (count, dimensions) of a scrambled Sobol sequence in the unit cube."""
     from scipy.stats import qmc  # slow to import
 
-    unit = qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random(
-        2 ** math.ceil(math.log2(count))
-    )
-    return np.asarray(unit[:count])
+    sequence = qmc.Sobol(dimensions, rng=np.random.default_rng(seed))
+    return np.asarray(sequence.random(2 ** math.ceil(math.log2(count)))[:count])

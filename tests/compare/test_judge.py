@@ -15,7 +15,7 @@ from compare import validation
 from compare.assessment import full_verdict
 from compare.catalogue import CLAIMS, PROTOCOLS
 from compare.claim import Claim, Criterion, Outcome, Text
-from compare.judge import judge, select, theory
+from compare.judge import select, theory
 from compare.kit.levels import Level, sets
 from compare.kit.plan import PLAN
 from compare.kit.quantities import quantity
@@ -23,6 +23,7 @@ from compare.kit.record import Missing, Planned, Records, Relation
 from compare.kit.statistics import COVERAGE, Estimate
 from model import InputError, Parameters
 from tests import measured as made
+from tests.measured import judged
 
 P = Parameters.named("reference")
 FINE = quantity("omega_c").resolution / 10
@@ -38,7 +39,7 @@ def claim(predict=lambda m: m.parameters.omega_0, quantity="omega_c", **more):
 
 
 def outcome(of, records):
-    return judge([of], records)[0].outcome
+    return judged(of, records).outcome
 
 
 @pytest.mark.parametrize(
@@ -59,11 +60,11 @@ def test_a_verdict_is_computed_from_the_numbers(value, uncertainty, expected):
 def test_without_measurements_it_was_not_run_and_the_reason_is_kept():
     why = Missing("settled", "mine", "nothing settles")
     other = Missing("other", "mine", "no matter")
-    (verdict,) = judge([claim()], Records((), (why, other, why)))
+    verdict = judged(claim(), Records((), (why, other, why)))
     assert verdict.outcome is Outcome.NOT_RUN
     assert verdict.missing == (replace(why, rows=2),)
     assert [str(each) for each in verdict.missing] == ["mine: nothing settles (2 left out)"]
-    assert "no number bears on" in str(judge([claim()], measured(1.0, FINE, "v_y"))[0].missing[0])
+    assert "no number bears on" in str(judged(claim(), measured(1.0, FINE, "v_y")).missing[0])
 
 
 def rows(count, protocol="settled", name="omega_c", set="mine"):
@@ -94,7 +95,7 @@ def test_what_was_measured_must_be_there(gone):
     kept = tuple(m for m in whole.measurements if GONE[gone](m))
     less = replace(whole, measurements=kept)
     expected = Outcome.CONFIRMED if gone == "another claim's" else Outcome.INCONCLUSIVE
-    (verdict,) = judge([both], less)
+    verdict = judged(both, less)
     assert verdict.outcome is expected
     assert verdict.planned == 10
     criterion = [m for m in whole.measurements if m.quantity != "v_y"]
@@ -117,14 +118,14 @@ def test_a_set_of_which_a_protocol_says_nothing_leaves_its_claims_undecided():
 def test_most_numbers_must_be_fine_enough_to_tell():
     sure, coarse = measured(P.omega_0, FINE), measured(P.omega_0, 0.01 * P.omega_0)
     for count, expected in (4, Outcome.CONFIRMED), (3, Outcome.INCONCLUSIVE):
-        (verdict,) = judge([claim()], sum([*[sure] * count, coarse, coarse], Records()))
+        verdict = judged(claim(), sum([*[sure] * count, coarse, coarse], Records()))
         assert verdict.outcome is expected
         assert verdict.resolving_power["omega_c"] < 1e-6
 
 
 def test_a_state_that_theory_does_not_know_refutes_and_a_breakdown_loses_its_own_claim_only():
     claims = [claim(lambda m: {}["no such state"]), claim(lambda m: 1 / 0), claim()]
-    unknown, broken, right = judge(claims, measured(P.omega_0, FINE))
+    unknown, broken, right = (judged(each, measured(P.omega_0, FINE)) for each in claims)
     outcomes = [each.outcome for each in (unknown, broken, right)]
     assert outcomes == [Outcome.REFUTED, Outcome.ERROR, Outcome.CONFIRMED]
     assert unknown.worst == math.inf
@@ -142,16 +143,15 @@ def test_bounds_hold_on_one_side_and_what_must_be_equal_has_no_tolerance():
 
 
 def test_a_prediction_may_be_uncertain_itself():
-    (verdict,) = judge(
-        [claim(lambda m: Estimate(P.omega_0 + 1e-7, 1e-7))], measured(P.omega_0, FINE / 100)
-    )
+    off = claim(lambda m: Estimate(P.omega_0 + 1e-7, 1e-7))
+    verdict = judged(off, measured(P.omega_0, FINE / 100))
     assert verdict.outcome is Outcome.CONFIRMED
     assert verdict.checks[0].tolerance == pytest.approx(COVERAGE * 1e-7, rel=1e-3)
 
 
 def test_resolving_power_is_the_error_of_theory_that_would_be_noticed():
     records = measured(P.omega_0, FINE)
-    (verdict,) = judge([claim()], records)
+    verdict = judged(claim(), records)
     power = verdict.resolving_power["omega_c"]
     for error, noticed in ((0.9 * power, Outcome.CONFIRMED), (1.1 * power, Outcome.REFUTED)):
         assert outcome(claim(lambda m, error=error: P.omega_0 * (1 + error)), records) is noticed
@@ -178,7 +178,7 @@ def test_a_set_of_ones_own_need_not_show_what_refutes_a_claim():
     false = replace(claim(), expected=Outcome.REFUTED)
     (row,) = measured(P.omega_0, FINE).measurements
     for name, passed in (("mine", True), ("reference", False)):
-        (verdict,) = judge([false], Records((replace(row, set=name),)))
+        verdict = judged(false, Records((replace(row, set=name),)))
         assert (verdict.outcome, verdict.passed) == (Outcome.CONFIRMED, passed)
 
 

@@ -14,7 +14,7 @@ import analytic
 from analytic.flowmeter import pulsation
 from compare.catalogue import CLAIMS
 from compare.claim import Outcome
-from compare.judge import judge, select
+from compare.judge import select
 from compare.kit import levels, settling
 from compare.kit.brackets import FINER, LONGER, USUAL, Bracket, Search, narrow
 from compare.kit.conditions import state_of
@@ -46,7 +46,7 @@ from compare.subjects.stationary import measure as settled
 from compare.subjects.thresholds import measure as thresholds
 from compare.subjects.unsteady import measure as unsteady
 from model import Case, Flow, Parameters, State
-from tests.measured import measured, motion
+from tests.measured import judged, measured, motion
 from tests.measured import thresholds as known
 
 P, HOPPING = Parameters.named("reference"), Parameters.named("hopping")
@@ -429,7 +429,8 @@ def test_what_swings_for_ever_settles_by_going_on_from_its_mean(runner, monkeypa
 
 
 def outcome_of(claim, *rows):
-    return judge(select(CLAIMS, [claim]), Records(rows))[0].outcome
+    (of,) = select(CLAIMS, [claim])
+    return judged(of, Records(rows)).outcome
 
 
 @pytest.mark.parametrize(
@@ -475,7 +476,8 @@ def test_a_prediction_is_no_surer_than_its_computation(monkeypatch):
     ):
         for factor, agrees in ((1.0, True), (1.001, False)):
             row = measured(protocol, quantity, factor * value, 0.0, blunt, "blunt", **conditions)
-            (check,) = judge(select(CLAIMS, [claim]), Records((row,)))[0].checks
+            (of,) = select(CLAIMS, [claim])
+            (check,) = judged(of, Records((row,))).checks
             assert check.agrees is agrees
             assert check.tolerance > 0
 
