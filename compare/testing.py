@@ -95,7 +95,6 @@ def read(source: Source, name: str = "") -> Series:
     Files are dualball's own, other HDF5 files with datasets of such names, or CSV with a head of
     such names; without one its columns are time and omega_c. `name` is what errors call it. Raises
     `InputError`."""
-    run = None
     if isinstance(source, Series):
         return source
     if isinstance(source, str | Path):
@@ -104,13 +103,14 @@ def read(source: Source, name: str = "") -> Series:
             source, _ = table.read(path, _COLUMNS, ["time"], ("time", "omega_c"))
         else:
             source = _hdf5(path)
-    if isinstance(source, Trajectory):
-        run = source
-        given: dict[str, npt.ArrayLike] = {name: component(run, name) for name in COMPONENTS}
-    else:
-        given = dict(source) if isinstance(source, Mapping) else {}
+    run = source if isinstance(source, Trajectory) else None
     name = name or (run.header.engine if run else "the motion")
-    if not isinstance(source, Mapping | Trajectory):
+    given: dict[str, npt.ArrayLike]
+    if isinstance(source, Trajectory):
+        given = {quantity: component(source, quantity) for quantity in COMPONENTS}
+    elif isinstance(source, Mapping):
+        given = dict(source)
+    else:
         try:
             given = dict(zip(("time", "omega_c"), source, strict=True))
         except (TypeError, ValueError) as error:
