@@ -41,7 +41,7 @@ from .memory import (
     pairs_at,
     rows_of,
 )
-from .parameters import AT_MOST, CORNER, FLUSH, STILL, UNMOVED
+from .parameters import ALIKE, AT_MOST, CORNER, FARTHEST, FLUSH, STILL, UNMOVED
 
 SIZE = MJ_CONTACT.itemsize
 WORDS = SIZE // 8
@@ -344,9 +344,9 @@ def inherit(model: Any, data: Any, memory: Any, contact: Any, old: Any) -> None:
     alone, spins = contact.state == NEW, (spin(model, data, old, 0), spin(model, data, old, 1))
     both = spins[0] + spins[1]
     contact.bias = old.bias if alone else 0.0
-    fixed = alone and is_fixed(model, memory, old, max(spins))
+    known = is_fixed(model, memory, old, max(spins)) or rolls(model, memory, contact, old)
     for axis in range(3):  # one that wanders over its bodies, or is made of several, has no speed
-        contact.speed[axis] = old.speed[axis] if fixed else math.inf
+        contact.speed[axis] = old.speed[axis] if alone and known else math.inf
     contact.state = max(contact.state, old.state)
     contact.error, contact.lift = max(contact.error, old.error), max(contact.lift, old.lift)
     contact.load += old.load
@@ -376,6 +376,24 @@ def is_fixed(model: Any, memory: Any, old: Any, turning: float) -> bool:
         creep += old.speed[axis] ** 2
     rolled = memory.law.fixed * turning * smaller_radius(model, old)
     return bool(old.moved <= 2 * (model.opt.timestep * (rolled + math.sqrt(creep))) ** 2)
+
+
+@kernel
+def rolls(model: Any, memory: Any, contact: Any, old: Any) -> bool:
+    """Whether a rigid contact has rolled: as far over one of its bodies as over the other."""
+    one, other = way(contact, old, 0), way(contact, old, 1)
+    farthest = FARTHEST * smaller_radius(model, old)
+    alike = abs(one - other) <= ALIKE * max(one, other) and max(one, other) <= farthest
+    return bool(memory.law.rigid and old.state == STICKS and alike)
+
+
+@kernel
+def way(contact: Any, old: Any, side: int) -> float:
+    """How far a contact has come over a body since it was the old one, m."""
+    square = 0.0
+    for axis in range(3):
+        square += (contact.place[side, axis] - old.place[side, axis]) ** 2
+    return math.sqrt(square)
 
 
 @kernel

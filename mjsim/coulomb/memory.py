@@ -43,7 +43,7 @@ CONTACT = np.dtype(
         ("load", _f8),  # normal force, N
         # friction in the axes of both geoms: geom, axis, force (N) or moment (N m)
         ("friction", _f8, (2, 3, 2)),
-        ("speed", _f8, 3),  # of slip, by the last Jacobian and present velocities, m s-1
+        ("speed", _f8, 3),  # relative, by the last Jacobian and present velocities, m s-1
         ("lift", _f8),  # distance that Baumgarte stabilisation holds, m
         # De Saxcé's shift, the coefficient of friction times the slip, m s-2
         ("predicted", _f8),

@@ -63,6 +63,9 @@ CCD_TOLERANCE = 1e-10
 """To which colliders find the points of rigid contacts; MuJoCo's own is 1e-6."""
 UNMOVED = 1e-6
 """Distance below which a contact is the one of the same number in the last step, m."""
+ALIKE, FARTHEST = 0.1, 0.2
+"""Part by which the ways of a contact that rolls over its bodies may differ; the longest in a step,
+in units of the smaller radius: what goes farther has jumped."""
 AT_MOST = 2.0
 """Depth that a contact has at most when it is new, in units of the way that its bodies close in a
 step."""

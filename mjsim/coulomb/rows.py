@@ -55,37 +55,39 @@ def write_references(data: Any, memory: Any) -> None:
 
 @kernel
 def store_speeds(model: Any, data: Any, memory: Any) -> None:
-    """Store how contacts slip, by the Jacobians of the last step and the velocities now."""
+    """Store how contacts part and slip, by the last Jacobians and the velocities now."""
     contacts, rows, velocity = contacts_of(memory), rows_of(memory), reals(data.qvel, model.nv)
     for i in range(memory.contacts):
         contact = contacts[i]
         for j in range(3):
             contact.speed[j] = 0.0
-        for t in range(2 if contact.dim > 1 else 0):
-            speed = times(memory, rows[contact.address + 1 + t], velocity)
+        for axis in range(min(contact.dim, 3)):
+            speed = times(memory, rows[contact.address + axis], velocity)
             for j in range(3):
-                contact.speed[j] += speed * contact.frame[1 + t, j]
+                contact.speed[j] += speed * contact.frame[axis, j]
 
 
 @kernel
 def add_turning(model: Any, data: Any, memory: Any, elapsed: float) -> None:
-    """Let contacts that stick turn along with their bodies: rows leave out that Jacobians change.
+    """Let contacts that stick turn along with their bodies, or roll: rows leave out that Jacobians
+    change.
 
     What is added is -dJ/dt v; of rigid contacts, which lose the velocity that the turning shows,
-    half of it.
+    half of it: so their forces do no work, and a disc that precesses keeps its energy.
     """
     contacts, rows, velocity = contacts_of(memory), rows_of(memory), reals(data.qvel, model.nv)
-    reference = reals(data.efc_aref, data.nefc)
-    share = (0.5 if memory.law.rigid else 1.0) / elapsed
+    reference, rigid = reals(data.efc_aref, data.nefc), memory.law.rigid
+    share = (0.5 if rigid else 1.0) / elapsed
     for i in range(memory.contacts):
         contact = contacts[i]
         if contact.speed[0] == math.inf or contact.dim == 1:
             continue
-        if not memory.law.rigid and contact.state != STICKS:
+        if not rigid and contact.state != STICKS:
             continue
-        for t in range(2):
+        closed = rigid and contact.state == STICKS and contact.load > 0
+        for axis in range(0 if closed else 1, 3):
             before = 0.0
             for j in range(3):
-                before += contact.frame[1 + t, j] * contact.speed[j]
-            change = times(memory, rows[contact.address + 1 + t], velocity) - before
-            reference[contact.address + 1 + t] -= change * share
+                before += contact.frame[axis, j] * contact.speed[j]
+            change = times(memory, rows[contact.address + axis], velocity) - before
+            reference[contact.address + axis] -= change * share

@@ -444,6 +444,50 @@ def test_what_spins_keeps_its_energy(kind, centre):
     assert then == pytest.approx(velocity, abs=1e-11)
 
 
+@pytest.mark.parametrize(("leans", "step"), [(5, 5e-4), (20, 1e-3), (40, 1e-3), (75, 1e-3)])
+def test_a_disc_that_precesses_keeps_its_energy(leans, step):
+    """Euler's disc (Moffatt, Nature 404, 2000): a thin one that rolls round on its rim while its
+    centre rests turns with sqrt(4 g/(a sin)) about the vertical. Rigid contacts that take the arm
+    of the beginning of a step lose a fifth of its energy in half a second at 20°."""
+    angle, radius, thick = np.radians(leans), 0.05, 3e-4
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><option timestep="{step}"/><default><geom friction="3"/></default><worldbody>'
+        '<geom type="plane" size="1 1 1"/>'
+        f'<body pos="0 0 {radius * np.sin(angle) + thick * np.cos(angle)}" euler="0 {leans} 0">'
+        f'<freejoint/><geom type="cylinder" size="{radius} {thick}"/></body></worldbody></mujoco>'
+    )
+    data, law, found = mujoco.MjData(model), Coulomb(model, rigid=True), []
+    data.qvel[3] = -np.sqrt(4 * G * np.sin(angle) / radius)
+    for seconds in (0.0, 0.5):
+        law.step(data, round(seconds / step))
+        for update in (mujoco.mj_forward, mujoco.mj_energyPos, mujoco.mj_energyVel):
+            update(model, data)
+        found.append(data.energy.sum())
+    assert found[1] == pytest.approx(found[0], rel=3e-3)
+    assert np.degrees(np.arccos(abs(data.xmat[1, 8]))) == pytest.approx(leans, abs=0.5)
+
+
+def test_what_rolls_on_a_body_that_turns_rolls_to_second_order():
+    """A ball on a turntable circles at 2/7 of its angular velocity (Weltner, Am. J. Phys. 47,
+    1979)."""
+    turning, far, size, off = 3.0, 0.5, 0.1, []
+    for step in (4e-3, 2e-3):
+        model = mujoco.MjModel.from_xml_string(
+            f'<mujoco><option timestep="{step}" tolerance="1e-20"/><worldbody>'
+            '<body><joint/><geom type="cylinder" size="3 .1" pos="0 0 -.1" mass="1e9"/></body>'
+            f'<body pos="{far} 0 {size}"><freejoint/><geom size="{size}" mass="1"/></body>'
+            "</worldbody></mujoco>"
+        )
+        data, law = mujoco.MjData(model), Coulomb(model, rigid=True)
+        circles = 2 / 7 * turning
+        data.qvel[[0, 2, 4]] = turning, far * circles, far * (turning - circles) / size
+        law.step(data, round(1 / step))
+        angle = circles * data.time
+        off.append(np.abs(data.qpos[1:3] - far * np.array([np.cos(angle), np.sin(angle)])).max())
+    assert off[0] < 1e-5
+    assert off[0] / off[1] == pytest.approx(4, abs=0.3)
+
+
 @WAYS
 @pytest.mark.parametrize("seeds", [[3], pytest.param(range(20), marks=pytest.mark.slow)])
 def test_piles_come_to_rest(seeds, rigid):
