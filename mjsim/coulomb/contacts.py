@@ -156,7 +156,7 @@ def find(model: Any, data: Any, memory: Any) -> None:
         clear(contact)
         contact.index, contact.address, contact.dim = i, address, given.dim
         contact.gap, contact.margin, contact.cone = given.dist, given.includemargin, given.mu
-        contact.speed[0] = math.inf
+        contact.velocity[0] = math.inf
         for j in range(5):
             contact.mu[j] = given.friction[j]
         for j in range(9):
@@ -187,7 +187,7 @@ def clear(contact: Any) -> None:
     contact.predicted, contact.found, contact.extrapolated = 0.0, 0.0, 0.0
     contact.bias, contact.error, contact.weakened = 0.0, 0.0, 0
     for axis in range(3):
-        contact.speed[axis] = 0.0
+        contact.velocity[axis] = 0.0
         for kind in range(2):
             contact.carried[axis, kind] = 0.0
             contact.friction[0, axis, kind] = contact.friction[1, axis, kind] = 0.0
@@ -345,8 +345,8 @@ def inherit(model: Any, data: Any, memory: Any, contact: Any, old: Any) -> None:
     both = spins[0] + spins[1]
     contact.bias = old.bias if alone else 0.0
     known = is_fixed(model, memory, old, max(spins)) or rolls(model, memory, contact, old)
-    for axis in range(3):  # one that wanders over its bodies, or is made of several, has no speed
-        contact.speed[axis] = old.speed[axis] if alone and known else math.inf
+    for axis in range(3):  # one that wanders over its bodies, or is made of several, has none
+        contact.velocity[axis] = old.velocity[axis] if alone and known else math.inf
     contact.state = max(contact.state, old.state)
     contact.error, contact.lift = max(contact.error, old.error), max(contact.lift, old.lift)
     contact.load += old.load
@@ -373,7 +373,7 @@ def is_fixed(model: Any, memory: Any, old: Any, turning: float) -> bool:
     """Whether a contact has moved on its bodies by no more than it creeps, and they don't roll."""
     creep = 0.0
     for axis in range(3 if old.state == STICKS else 0):
-        creep += old.speed[axis] ** 2
+        creep += old.velocity[axis] ** 2
     rolled = memory.law.fixed * turning * smaller_radius(model, old)
     return bool(old.moved <= 2 * (model.opt.timestep * (rolled + math.sqrt(creep))) ** 2)
 

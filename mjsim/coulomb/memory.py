@@ -43,7 +43,7 @@ CONTACT = np.dtype(
         ("load", _f8),  # normal force, N
         # friction in the axes of both geoms: geom, axis, force (N) or moment (N m)
         ("friction", _f8, (2, 3, 2)),
-        ("speed", _f8, 3),  # relative, by the last Jacobian and present velocities, m s-1
+        ("velocity", _f8, 3),  # relative, by the last Jacobian and present velocities, m s-1
         ("lift", _f8),  # distance that Baumgarte stabilisation holds, m
         # De Saxcé's shift, the coefficient of friction times the slip, m s-2
         ("predicted", _f8),
@@ -363,7 +363,7 @@ def check_state(state: Mapping[str, npt.NDArray[Any]], model: Any, law: Law) -> 
         ):
             raise ValueError(f"not a state of Coulomb: {name} of shape {values.shape}")
         fields = values.dtype.names or ()
-        for each in [values[field] for field in fields if field != "speed"] or [values]:
+        for each in [values[field] for field in fields if field != "velocity"] or [values]:
             if name != "time" and not np.isfinite(each).all():
                 raise ValueError(f"not a state of Coulomb: {name} must be finite")
     if not np.array_equal(state["sizes"], sizes(model)):

@@ -54,17 +54,17 @@ def write_references(data: Any, memory: Any) -> None:
 
 
 @kernel
-def store_speeds(model: Any, data: Any, memory: Any) -> None:
+def store_velocities(model: Any, data: Any, memory: Any) -> None:
     """Store how contacts part and slip, by the last Jacobians and the velocities now."""
     contacts, rows, velocity = contacts_of(memory), rows_of(memory), reals(data.qvel, model.nv)
     for i in range(memory.contacts):
         contact = contacts[i]
         for j in range(3):
-            contact.speed[j] = 0.0
+            contact.velocity[j] = 0.0
         for axis in range(min(contact.dim, 3)):
             speed = times(memory, rows[contact.address + axis], velocity)
             for j in range(3):
-                contact.speed[j] += speed * contact.frame[axis, j]
+                contact.velocity[j] += speed * contact.frame[axis, j]
 
 
 @kernel
@@ -80,7 +80,7 @@ def add_turning(model: Any, data: Any, memory: Any, elapsed: float) -> None:
     share = (0.5 if rigid else 1.0) / elapsed
     for i in range(memory.contacts):
         contact = contacts[i]
-        if contact.speed[0] == math.inf or contact.dim == 1:
+        if contact.velocity[0] == math.inf or contact.dim == 1:
             continue
         if not rigid and contact.state != STICKS:
             continue
@@ -88,6 +88,6 @@ def add_turning(model: Any, data: Any, memory: Any, elapsed: float) -> None:
         for axis in range(0 if closed else 1, 3):
             before = 0.0
             for j in range(3):
-                before += contact.frame[axis, j] * contact.speed[j]
+                before += contact.frame[axis, j] * contact.velocity[j]
             change = times(memory, rows[contact.address + axis], velocity) - before
             reference[contact.address + axis] -= change * share

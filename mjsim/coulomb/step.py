@@ -50,7 +50,7 @@ from .rigid import (
     take_depth_away,
     turn_accelerations,
 )
-from .rows import add_turning, multiply, set_up, store_speeds, write_references
+from .rows import add_turning, multiply, set_up, store_velocities, write_references
 
 
 @kernel
@@ -204,7 +204,7 @@ def hand_on(model: Any, data: Any, memory: Any, known: bool, over: bool) -> None
 def store(model: Any, data: Any, memory: Any, over: bool) -> None:
     """Store forces in the axes of bodies, and how contacts slip."""
     store_forces(memory, over)
-    store_speeds(model, data, memory)
+    store_velocities(model, data, memory)
 
 
 @kernel

@@ -385,7 +385,7 @@ def restored(rigid):
         law.restore(state | {"time": np.full(2, time)})
         law.step(mujoco.MjData(model), 20)
     huge = state["contacts"].copy()
-    for field in ("load", "friction", "speed", "predicted", "bias", "place"):
+    for field in ("load", "friction", "velocity", "predicted", "bias", "place"):
         huge[field] = 1e300
     huge["state"] = 77
     law.restore(state | {"contacts": huge}, data)
