@@ -17,7 +17,15 @@ from statistics import median
 
 from compare.claim import Claim, EngineVerdict, Outcome, Verdict
 from compare.convergence import Ends, zero_step_limits
-from compare.judge import checks_of, inconclusive_criteria, lost_to, outcome, per_criterion, verdict
+from compare.judge import (
+    checks_of,
+    counted,
+    inconclusive_criteria,
+    lost_to,
+    outcome,
+    per_criterion,
+    verdict,
+)
 from compare.kit.engines import Engine, engine
 from compare.kit.quantities import quantity
 from compare.kit.record import Check, Missing, Records, RecordsByEngine, Relation
@@ -43,11 +51,18 @@ def full_verdict(claim: Claim, evidence: RecordsByEngine) -> Verdict:
             reason=said.error,
             checks=said.checks,
             deviations=_deviations(said.checks),
+            missing=said.missing,
             left_out=said.left_out,
         )
     else:
         first = assess(claim, engine(name), steps, ends)
-        said = Verdict(claim=claim, outcome=first.outcome, checks=first.checks, error=first.reason)
+        said = Verdict(
+            claim=claim,
+            outcome=first.outcome,
+            checks=first.checks,
+            error=first.reason,
+            missing=first.missing,
+        )
     beside = (assess(claim, engine(other), own, ends, first.checks) for other, own in others)
     return replace(said, engines=(first, *beside))
 
@@ -86,7 +101,9 @@ def assess(
     if not shared and not any(found.values()):
         why = "at this level nothing that bears on the claim was asked of it"
         reason = "; ".join([why, *map(str, missing[:SEVERAL])])
-        return EngineVerdict(engine=by.name, outcome=Outcome.NOT_ASKED, reason=reason)
+        return EngineVerdict(
+            engine=by.name, outcome=Outcome.NOT_ASKED, reason=reason, missing=counted(missing)
+        )
     if by.relative_tolerance:
         checks, orders = _loosened(found[max(found)], by.relative_tolerance), []
     else:
@@ -109,6 +126,7 @@ def assess(
         checks=checks,
         order=median(orders) if orders else math.nan,
         deviations=_deviations(usual),
+        missing=counted(missing),
         left_out=sum(each.rows for each in missing) + most.total() - len(checks),
     )
 

@@ -181,8 +181,10 @@ class EngineVerdict(Judged):
     deviations: tuple[float, ...] = ()
     """Sizes of deviations, divided by their scales, of numbers that are sure enough to tell them:
     at MuJoCo's own step of 2 ms, or of an engine that is judged at one step at that."""
+    missing: tuple[Missing, ...] = ()
+    """What its protocols left out, and why."""
     left_out: int = 0
-    """Measurements that its protocols left out, or that have no limit."""
+    """Measurements that they left out, or that have no limit."""
 
     @property
     def typical(self) -> float:

@@ -79,10 +79,7 @@ def verdict(claim: Claim, records: Records) -> Verdict:
     and is counted apart. Whatever a prediction raises makes the verdict an error of this claim
     alone."""
     lost = lost_to(claim, records)
-    left_out = Counter[Missing]()
-    for each in (*lost, *(m for m in records.missing if m.protocol in claim.protocols)):
-        left_out[replace(each, rows=0)] += each.rows
-    missing = tuple(replace(each, rows=rows) for each, rows in left_out.most_common())
+    missing = counted([*lost, *(m for m in records.missing if m.protocol in claim.protocols)])
     try:
         checks = tuple(checks_of(claim, records))
     except Exception as error:
@@ -95,6 +92,14 @@ def verdict(claim: Claim, records: Records) -> Verdict:
         missing = tuple(Missing(name, "all sets", why, 0) for name in known)
     said = outcome(claim, checks, per_criterion(checks), lost)
     return Verdict(claim=claim, outcome=said, checks=checks, missing=missing)
+
+
+def counted(missing: Iterable[Missing]) -> tuple[Missing, ...]:
+    """What is missing for each reason, the most first."""
+    rows = Counter[Missing]()
+    for each in missing:
+        rows[replace(each, rows=0)] += each.rows
+    return tuple(replace(each, rows=count) for each, count in rows.most_common())
 
 
 def outcome(

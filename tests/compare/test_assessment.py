@@ -189,3 +189,13 @@ def test_an_engine_is_asked_every_bearing_on_every_set_that_it_shares(lost, outc
     assert said(dict.fromkeys((1, 2, 3), own), Records(counts + flows), of).outcome is outcome
     # counts confirm no number
     assert full_verdict(of, {"mujoco": {1: Records(counts)}}).outcome is Outcome.NOT_RUN
+
+
+@pytest.mark.parametrize("engine", ["mujoco", "mujoco-plain", "mujoco-defaults"])
+def test_an_engine_that_is_asked_alone_counts_what_it_could_not_measure(engine):
+    gone = (Missing("settled", "mine", "nothing settles", 3),) * 2
+    divisors = {"mujoco": (1,), "mujoco-plain": (1, 2, 4), "mujoco-defaults": (2,)}[engine]
+    steps = {n: Records(seen(0.3 / n).measurements, gone) for n in divisors}
+    verdict = full_verdict(claim(), {engine: steps})
+    assert verdict.missing == (Missing("settled", "mine", "nothing settles", 6),)
+    assert verdict.planned == 1 + 6
