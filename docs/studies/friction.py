@@ -14,13 +14,16 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any
 
 import mujoco
 import numpy as np
 
 from compare.kit.pages import Rows
+from docs.studies.small_scenes import FLOOR, free
+from docs.studies.small_scenes import model as world
 from docs.studies.tables import write_all
+from docs.studies.ways import Plain, Stepper
 from mjsim import Coulomb
 
 G = 9.81
@@ -46,22 +49,6 @@ WAYS: dict[str, dict[str, Any]] = {
 CHOSEN, BODIES, SETTLING, LAST = 10, 18, 5.0, 1.0
 STILL, RISE = 1e-9, 1e-9
 """Most that a body at rest moves in the last second, m; and that energy rises, J."""
-
-
-class Stepper(Protocol):
-    model: Any
-
-    def step(self, data: Any, nstep: int = 1) -> None: ...
-
-
-class Plain:
-    """`mj_step` with the methods of `Coulomb`."""
-
-    def __init__(self, model: Any) -> None:
-        self.model = model
-
-    def step(self, data: Any, nstep: int = 1) -> None:
-        mujoco.mj_step(self.model, data, nstep)
 
 
 class Installed(Coulomb):
@@ -92,29 +79,24 @@ def start(
 def one(
     geom: str, mu: float = 0.6, slope: float = 0.0, height: float = 0.05, step: float = 2e-3
 ) -> Any:
-    """A body on a plane; gravity is tilted instead of the plane, degrees."""
-    a = math.radians(slope)
-    return mujoco.MjModel.from_xml_string(
-        f'<mujoco><option cone="elliptic" tolerance="1e-12" timestep="{step}" '
-        f'gravity="{G * math.sin(a)} 0 {-G * math.cos(a)}"/><default><geom '
-        f'friction="{mu}"/></default><worldbody>'
-        f'<geom type="plane" size="9 9 1"/><body pos="0 0 '
-        f'{height}"><freejoint/>{geom}</body></worldbody></mujoco>'
-    )
+    """A body on a plane, on a slope in degrees."""
+    option = f'tolerance="1e-12" timestep="{step}"'
+    return world(FLOOR + free("body", f"0 0 {height}", geom), option, slope=slope, mu=mu)
 
 
 LONG = "heap of 216", "at rest, 1000"
 """Scenes that are measured with soft contacts only: others take half an hour."""
-BOX, BALL = (
-    '<geom type="box" size=".05 .05 .05" mass="1"/>',
-    '<geom type="sphere" size=".05" mass="1"/>',
-)
-FLAT = '<geom type="box" size=".1 .1 .05" mass="1"/>'
+BOX, BALL = 'type="box" size=".05 .05 .05" mass="1"', 'type="sphere" size=".05" mass="1"'
+FLAT = 'type="box" size=".1 .1 .05" mass="1"'
 
 
 def creep(scene: str, way: dict[str, Any]) -> float:
     """How far a body of a scene goes in a second once it has settled, m s-1."""
-    data, stepper = start(mujoco.MjModel.from_xml_path(f"docs/friction/{scene}.xml"), **way)
+    return crept(*start(mujoco.MjModel.from_xml_path(f"docs/friction/{scene}.xml"), **way))
+
+
+def crept(data: Any, stepper: Stepper) -> float:
+    """How far a body goes in the sixth second, at steps of 2 ms, m."""
     stepper.step(data, 2500)
     place = data.xpos.copy()
     stepper.step(data, 500)
@@ -149,33 +131,23 @@ def shaken(way: dict[str, Any]) -> float:
 def columns(count: int) -> Any:
     """Stacks of boxes with four contacts each; one ball for a single contact."""
     across = max(round(math.sqrt(count / 4)), 1)
-    bodies = "".join(
-        f'<body pos="{0.3 * (k % across)} 0 {0.05 + 0.1 * (k // across)}"><freejoint/>{BOX}</body>'
+    boxes = "".join(
+        free(f"b{k}", f"{0.3 * (k % across)} 0 {0.05 + 0.1 * (k // across)}", BOX)
         for k in range(count // 4)
     )
-    bodies = bodies or f'<body pos="0 0 .05"><freejoint/>{BALL}</body>'
-    return mujoco.MjModel.from_xml_string(
-        '<mujoco><option cone="elliptic" gravity="1 0 -9.6"/><default><geom '
-        'friction=".6"/></default><worldbody>'
-        f'<geom type="plane" size="9 9 1"/>{bodies}</worldbody></mujoco>'
-    )
+    model = world(FLOOR + (boxes or free("ball", "0 0 .05", BALL)))
+    model.opt.gravity[:] = 1, 0, -9.6
+    return model
 
 
 def heap(count: int) -> Any:
     """Boxes that fall on a floor in layers of nine, each turned a little."""
     rng, bodies = np.random.default_rng(count), ""
     for k in range(count):
-        x, y, turn = 0.13 * (k % 3 - 1), 0.13 * (k // 3 % 3 - 1), rng.normal(size=3) * 10
-        place, angles = (
-            f"{x} {y} {0.1 + 0.15 * (k // 9)}",
-            " ".join(f"{angle:.3f}" for angle in turn),
-        )
-        bodies += f'<body pos="{place}" euler="{angles}"><freejoint/>{BOX}</body>'
-    return mujoco.MjModel.from_xml_string(
-        '<mujoco><option cone="elliptic"/><size memory="50M"/><default><geom '
-        'friction=".6"/></default><worldbody>'
-        f'<geom type="plane" size="9 9 1"/>{bodies}</worldbody></mujoco>'
-    )
+        place = f"{0.13 * (k % 3 - 1)} {0.13 * (k // 3 % 3 - 1)} {0.1 + 0.15 * (k // 9)}"
+        angles = " ".join(f"{angle:.3f}" for angle in rng.normal(size=3) * 10)
+        bodies += free(f"b{k}", place, BOX, euler=angles)
+    return world(FLOOR + bodies, more='<size memory="50M"/>')
 
 
 def cost(
@@ -269,17 +241,19 @@ def holding() -> Rows:
     ]
 
 
-def slide_down(step: float, way: dict[str, Any]) -> tuple[float, float]:
-    """A box that slides down 20°, mu 0.25: error of its acceleration, at most; share of steps
-    without contact."""
-    data, stepper = start(one(BOX, 0.25, 20, step=step), **way)
+def slide_down(
+    step: float, way: dict[str, Any], geom: str = BOX, mu: float = 0.25
+) -> tuple[float, float]:
+    """A body that slides down 20°: error of its acceleration, at most; share of steps without
+    contact."""
+    data, stepper = start(one(geom, mu, 20, step=step), **way)
     stepper.step(data, round(1.5 / step))
     speeds, lost = [data.qvel[0]], 0
     for _ in range(round(0.5 / step)):
         stepper.step(data)
         speeds.append(data.qvel[0])
         lost += data.efc_force.max(initial=0) <= 0
-    exact = G * (math.sin(math.radians(20)) - 0.25 * math.cos(math.radians(20)))
+    exact = G * (math.sin(math.radians(20)) - mu * math.cos(math.radians(20)))
     return float(np.abs(np.diff(speeds) / step / exact - 1).max()), lost * step / 0.5
 
 
@@ -449,14 +423,12 @@ def servo() -> Rows:
 
     def settled(model: Any, servo: float | None) -> list[str]:
         model.geom_margin[:] = 4e-3 if servo else 0.0
-        data, stepper = mujoco.MjData(model), Coulomb(model, servo=servo)
-        stepper.step(data, 2500)
-        place = data.xpos.copy()
-        stepper.step(data, 500)
-        return [f"{np.abs(data.contact.dist).max():.1e}", f"{np.abs(data.xpos - place).max():.1e}"]
+        data = mujoco.MjData(model)
+        way = crept(data, Coulomb(model, servo=servo))
+        return [f"{np.abs(data.contact.dist).max():.1e}", f"{way:.1e}"]
 
     def rolls(servo: float | None) -> list[str]:
-        model = one('<geom size=".01" mass=".03"/>', slope=5)
+        model = one('size=".01" mass=".03"', slope=5)
         model.geom_margin[:] = 4e-3 if servo else 0.0
         model.qpos0[2] = 0.01
         data, stepper = mujoco.MjData(model), Coulomb(model, servo=servo)
@@ -509,12 +481,9 @@ def pile(seed: int, mixed: bool) -> Any:
         x, y = rng.uniform(-0.1, 0.1, 2)
         kind = rng.choice(["box", "capsule", "ellipsoid", "cylinder", "sphere"]) if mixed else "box"
         q, s = (" ".join(map(str, values)) for values in (turn / np.linalg.norm(turn), size))
-        geom = f'<freejoint/><geom type="{kind}" size="{s}"/>'
-        bodies += f'<body pos="{x} {y} {0.1 + 0.12 * k}" quat="{q}">{geom}</body>'
-    return mujoco.MjModel.from_xml_string(
-        '<mujoco><option cone="elliptic"/><default><geom friction=".6"/></default><worldbody>'
-        f'<geom type="plane" size="9 9 1"/>{bodies}</worldbody></mujoco>'
-    )
+        place = f"{x} {y} {0.1 + 0.12 * k}"
+        bodies += free(f"b{k}", place, f'type="{kind}" size="{s}"', quat=q)
+    return world(FLOOR + bodies)
 
 
 def settle(data: Any, stepper: Stepper) -> tuple[float, float]:
