@@ -13,14 +13,15 @@ import mujoco
 import numpy as np
 import pytest
 
+from docs.studies import friction
 from mjsim import Coulomb
 from mjsim.coulomb.parameters import Law
 
 G = 9.81
 BOX = '<geom type="box" size=".05 .05 .05" mass="1"/>'
 FLAT = '<geom type="box" size=".1 .1 .05" mass="1"/>'
-CYLINDER = '<geom type="cylinder" size=".05 .05" mass="1"/>'
 BALL = '<geom type="sphere" size=".05" mass="1"/>'
+FLOOR = '<geom type="plane" size="9 9 1"/>'
 SCENES = Path(__file__).parents[2] / "docs" / "friction"
 WAYS = pytest.mark.parametrize("rigid", [False, True], ids=["soft", "rigid"])
 
@@ -45,18 +46,19 @@ def scene(
         f'<mujoco><option cone="{cone}" gravity="{G * np.sin(slope)} 0 {-G * np.cos(slope)}" '
         f"{option}/>"
         f'<default><geom friction="{mu} {friction}" condim="{condim}"/></default>'
-        f'<worldbody><geom type="plane" size="9 9 1"/>{bodies}</worldbody></mujoco>'
+        f"<worldbody>{FLOOR}{bodies}</worldbody></mujoco>"
     )
     return model, mujoco.MjData(model)
 
 
-def creep(model, rigid=False):
-    """How far bodies move in 500 steps after 2500, m."""
-    data, law = mujoco.MjData(model), Coulomb(model, rigid=rigid)
-    law.step(data, 2500)
-    place = data.xpos.copy()
-    law.step(data, 500)
-    return np.abs(data.xpos - place).max()
+def world(bodies, option=""):
+    return mujoco.MjModel.from_xml_string(
+        f"<mujoco><option {option}/><worldbody>{bodies}</worldbody></mujoco>"
+    )
+
+
+def creep(model, rigid):
+    return friction.crept(*friction.start(model, law={"rigid": rigid}))
 
 
 @WAYS
@@ -85,55 +87,32 @@ def test_nothing_creeps(rigid, option, more):
 
 @WAYS
 def test_breaks_away_at_the_limit(rigid):
-    model, data = scene()
-    law = Coulomb(model, rigid=rigid)
-    for share in [*np.linspace(0, 0.95, 500), *np.linspace(0.95, 1.05, 1000)]:
-        data.qfrc_applied[0] = share * 0.6 * G
-        law.step(data)
-        if share > 0.97 and data.qvel[0] > 1e-5:
-            break
-    assert share == pytest.approx(1, abs=5e-3)
+    assert friction.breakaway({"law": {"rigid": rigid}}) == pytest.approx(1, abs=5e-3)
 
 
 @WAYS
-@pytest.mark.parametrize("geom", [BOX, CYLINDER, BALL], ids=["box", "cylinder", "ball"])
+@pytest.mark.parametrize("shape", ["box", "cylinder", "sphere"])
 @pytest.mark.parametrize("step", [4e-3, 2e-3, 1e-3])
-def test_what_slides_keeps_its_contacts(rigid, geom, step):
-    """Down a slope with g (sin - mu cos), to 1e-9, and never without contact; where it begins, it
-    settles for 2 s."""
+def test_what_slides_keeps_its_contacts(rigid, shape, step):
+    """Down a slope with g (sin - mu cos), to 1e-9, and never without contact."""
+    geom = f'type="{shape}" size=".05 .05 .05" mass="1"'
     # a ball slides as long as mu < 2/7 tan
-    slope, mu = np.radians(20), 0.05 if geom == BALL else 0.25
-    model, data = scene(slope, mu, geom=geom, option=f'timestep="{step}" tolerance="1e-12"')
-    law, speeds, loads = Coulomb(model, rigid=rigid), [], []
-    law.step(data, round(2 / step))
-    for _ in range(round(0.5 / step)):
-        law.step(data)
-        speeds.append(data.qvel[0])
-        loads.append(data.efc_force.max(initial=0))
-    exact = G * (np.sin(slope) - mu * np.cos(slope))
+    mu = 0.05 if shape == "sphere" else 0.25
+    error, lost = friction.slide_down(step, {"law": {"rigid": rigid}}, geom, mu)
     # A cylinder's three points turn it a little as it begins: that dies out as slowly as it slides
     # fast.
-    assert np.diff(speeds) / step == pytest.approx(
-        exact, rel=1e-4 if geom == CYLINDER and rigid else 1e-9
-    )
-    assert min(loads) > 0
+    assert error < (1e-4 if shape == "cylinder" and rigid else 1e-9)
+    assert lost == 0
 
 
 @WAYS
 @pytest.mark.parametrize("step", [4e-3, 1e-3])
 @pytest.mark.parametrize(("mu", "speed"), [(0.2, 2), (0.4, 2), (1.2, 2), (1.2, 5)])
 def test_what_is_pushed_off_keeps_its_height_and_stops_in_time(rigid, step, mu, speed):
-    model, data = scene(mu=mu, geom=FLAT, option=f'timestep="{step}" tolerance="1e-12"')
-    law, heights = Coulomb(model, rigid=rigid), []
-    law.step(data, round(1 / step))
-    data.qvel[0], begin = speed, data.qpos[0]
-    for _ in range(round(1.2 * speed / (mu * G * step))):
-        law.step(data)
-        heights.append(data.qpos[2])
-    assert np.ptp(heights) < 3e-5
-    assert data.qpos[0] - begin == pytest.approx(
-        speed**2 / (2 * mu * G), abs=1.1 * step * speed / 2
-    )
+    height, error = friction.pushed_off(step, {"law": {"rigid": rigid}}, mu, speed)
+    assert height < 3e-5
+    # of the way v^2/(2 mu g), that of half a step at the speed
+    assert abs(error) < 1.1 * step * mu * G / speed
 
 
 def test_servo_takes_the_depth_away():
@@ -398,12 +377,10 @@ def test_rigid_contacts_know_of_dampers(integrator):
 
 @pytest.mark.parametrize("integrator", ["Euler", "implicitfast"])
 def test_a_damped_finger_lands_in_a_step(integrator):
-    model = mujoco.MjModel.from_xml_string(
-        f'<mujoco><option integrator="{integrator}" timestep=".002" '
-        f'tolerance="1e-12"/><worldbody><geom type="plane" '
-        'size="1 1 1"/><body pos="0 0 .1"><joint type="slide" axis="0 0 1" damping="50"/><geom '
-        'size=".02" mass=".2"/>'
-        "</body></worldbody></mujoco>"
+    model = world(
+        f'{FLOOR}<body pos="0 0 .1"><joint type="slide" axis="0 0 1" damping="50"/>'
+        '<geom size=".02" mass=".2"/></body>',
+        f'integrator="{integrator}" timestep=".002" tolerance="1e-12"',
     )
     data, law = mujoco.MjData(model), Coulomb(model, rigid=True)
     data.qvel[0] = -24.0  # it comes into sight of the floor before it touches it
@@ -423,14 +400,9 @@ def test_a_damped_finger_lands_in_a_step(integrator):
 def test_what_spins_keeps_its_energy(kind, centre):
     """With rigid contacts: Euler's method alone takes the moment of the beginning of a step, and
     feeds it."""
-    model = mujoco.MjModel.from_xml_string(
-        '<mujoco><option gravity="0 0 0"/><worldbody><body><freejoint/>'
-        f'<geom type="{kind}" size=".02 .05 .03" pos="{centre}" quat="1 .3 .2 '
-        f'.1"/></body></worldbody></mujoco>'
-    )
-    law = Coulomb(model, rigid=True)
-
-    data, found = mujoco.MjData(model), []
+    geom = f'<geom type="{kind}" size=".02 .05 .03" pos="{centre}" quat="1 .3 .2 .1"/>'
+    model = world(f"<body><freejoint/>{geom}</body>", 'gravity="0 0 0"')
+    data, law, found = mujoco.MjData(model), Coulomb(model, rigid=True), []
     data.qvel[3:] = 1, 12, 60
     for steps in (0, 600):
         law.step(data, steps)
@@ -450,11 +422,11 @@ def test_a_disc_that_precesses_keeps_its_energy(leans, step):
     centre rests turns with sqrt(4 g/(a sin)) about the vertical. Rigid contacts that take the arm
     of the beginning of a step lose a fifth of its energy in half a second at 20°."""
     angle, radius, thick = np.radians(leans), 0.05, 3e-4
-    model = mujoco.MjModel.from_xml_string(
-        f'<mujoco><option timestep="{step}"/><default><geom friction="3"/></default><worldbody>'
-        '<geom type="plane" size="1 1 1"/>'
-        f'<body pos="0 0 {radius * np.sin(angle) + thick * np.cos(angle)}" euler="0 {leans} 0">'
-        f'<freejoint/><geom type="cylinder" size="{radius} {thick}"/></body></worldbody></mujoco>'
+    model = world(
+        f'{FLOOR}<body pos="0 0 {radius * np.sin(angle) + thick * np.cos(angle)}" '
+        f'euler="0 {leans} 0"><freejoint/>'
+        f'<geom type="cylinder" size="{radius} {thick}" friction="3"/></body>',
+        f'timestep="{step}"',
     )
     data, law, found = mujoco.MjData(model), Coulomb(model, rigid=True), []
     data.qvel[3] = -np.sqrt(4 * G * np.sin(angle) / radius)
@@ -472,11 +444,10 @@ def test_what_rolls_on_a_body_that_turns_rolls_to_second_order():
     1979)."""
     turning, far, size, off = 3.0, 0.5, 0.1, []
     for step in (4e-3, 2e-3):
-        model = mujoco.MjModel.from_xml_string(
-            f'<mujoco><option timestep="{step}" tolerance="1e-20"/><worldbody>'
+        model = world(
             '<body><joint/><geom type="cylinder" size="3 .1" pos="0 0 -.1" mass="1e9"/></body>'
-            f'<body pos="{far} 0 {size}"><freejoint/><geom size="{size}" mass="1"/></body>'
-            "</worldbody></mujoco>"
+            f'<body pos="{far} 0 {size}"><freejoint/><geom size="{size}" mass="1"/></body>',
+            f'timestep="{step}" tolerance="1e-20"',
         )
         data, law = mujoco.MjData(model), Coulomb(model, rigid=True)
         circles = 2 / 7 * turning
@@ -493,8 +464,6 @@ def test_what_rolls_on_a_body_that_turns_rolls_to_second_order():
 def test_piles_come_to_rest(seeds, rigid):
     """The collider of boxes drops points and finds them again: bodies would rock if they were not
     put back."""
-    from docs.studies import friction
-
     models = [friction.pile(seed, mixed=False) for seed in seeds]
     plain = [friction.settle(*friction.start(model))[1] for model in models]
     law = {"rigid": rigid}
@@ -513,9 +482,7 @@ def test_piles_come_to_rest(seeds, rigid):
     ],
 )
 def test_rigid_contacts_know_of_dampers_that_are_changed_while_it_runs(joint, installed):
-    model = mujoco.MjModel.from_xml_string(
-        f'<mujoco><option gravity="0 0 0"/><worldbody><body>{joint}</body></worldbody></mujoco>'
-    )
+    model = world(f"<body>{joint}</body>", 'gravity="0 0 0"')
     law, data, plain = Coulomb(model, rigid=True), *(mujoco.MjData(model) for _ in range(2))
     data.qvel[0] = plain.qvel[0] = 1.0
     for damping in (0.01, 200.0, 3.0):
@@ -551,10 +518,8 @@ def test_points_that_the_collider_adds_for_a_step_jolt_nothing(rigid, apart):
     bodies = "".join(
         f'<body pos="{apart * k} 0 {0.0508 + 0.1 * k}"><freejoint/>{BOX}</body>' for k in range(3)
     )
-    model = mujoco.MjModel.from_xml_string(
-        '<mujoco><option cone="elliptic" gravity="1.2 0 -9.7"/><default><geom friction=".6"/>'
-        f'</default><worldbody><geom type="plane" size="9 9 1"/>{bodies}</worldbody></mujoco>'
-    )
+    model = world(FLOOR + bodies, 'gravity="1.2 0 -9.7"')
+    model.geom_friction[:, 0] = 0.6
     data, law, counts, fastest = mujoco.MjData(model), Coulomb(model, rigid=rigid), set(), 0.0
     law.step(data, 1000)
     for _ in range(4000):
@@ -568,10 +533,9 @@ def test_points_that_the_collider_adds_for_a_step_jolt_nothing(rigid, apart):
 @pytest.mark.parametrize("shape", ['"cylinder" size=".009 .03"', '"capsule" size=".009 .03"'])
 def test_what_lies_on_its_smooth_side_stays(shape):
     """Under rigid contacts, whose points colliders must not find a micrometre beside."""
-    model = mujoco.MjModel.from_xml_string(
-        '<mujoco><worldbody><geom type="box" size=".2 .2 .03" pos="0 0 .03"/><body '
-        f'pos=".003 .002 .069" euler="90 0 0"><freejoint/><geom type={shape} mass=".05"/></body>'
-        "</worldbody></mujoco>"
+    model = world(
+        '<geom type="box" size=".2 .2 .03" pos="0 0 .03"/><body pos=".003 .002 .069" '
+        f'euler="90 0 0"><freejoint/><geom type={shape} mass=".05"/></body>'
     )
     data = mujoco.MjData(model)
     Coulomb(model, rigid=True).step(data, 1000)
@@ -596,9 +560,7 @@ OVERLAPS = {
 @pytest.mark.parametrize("bodies", OVERLAPS.values(), ids=OVERLAPS)
 def test_geoms_that_cannot_part_come_to_rest(rigid, bodies):
     """What would push them out of each other would do work for ever."""
-    model = mujoco.MjModel.from_xml_string(
-        f'<mujoco><worldbody><geom type="plane" size="9 9 1"/>{bodies}</worldbody></mujoco>'
-    )
+    model = world(FLOOR + bodies)
     data, law = mujoco.MjData(model), Coulomb(model, rigid=rigid)
     law.step(data, 4000)
     assert np.abs(data.qvel).max() < 1e-6
@@ -645,11 +607,8 @@ def test_kinetic_friction_is_not_taken_twice_from_contacts_that_are_asked_again(
 
 def test_restitution_of_each_geom():
     """A ball bounces by what it has, another one not at all."""
-    model = mujoco.MjModel.from_xml_string(
-        '<mujoco><worldbody><geom type="plane" size="9 9 1"/>'
-        '<body pos="0 0 1"><freejoint/><geom size=".05"/></body>'
-        '<body pos="1 0 1"><freejoint/><geom size=".05"/></body></worldbody></mujoco>'
-    )
+    balls = (f'<body pos="{x} 0 1"><freejoint/><geom size=".05"/></body>' for x in (0, 1))
+    model = world(FLOOR + "".join(balls))
     data, law = mujoco.MjData(model), Coulomb(model, rigid=True, restitution=[0.0, 0.8, 0.0])
     heights = []
     for _ in range(450):  # until .9 s: the first falls for .44 s
@@ -669,10 +628,7 @@ def test_restitution_of_each_geom():
 
 def test_steps_that_did_not_come_to_their_share_are_counted():
     """A share that no solution reaches in the steps it may take."""
-    model = mujoco.MjModel.from_xml_string(
-        '<mujoco><worldbody><geom type="plane" size="9 9 1"/><body pos="0 0 .3" euler="10 20 0">'
-        f"<freejoint/>{BOX}</body></worldbody></mujoco>"
-    )
+    model = world(f'{FLOOR}<body pos="0 0 .3" euler="10 20 0"><freejoint/>{BOX}</body>')
     usual, strict = Coulomb(model), Coulomb(model, share=1e-9)
     for law in (usual, strict):
         data = mujoco.MjData(model)
