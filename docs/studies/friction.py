@@ -271,22 +271,26 @@ def pushed_off(
     return float(np.ptp(heights)), float((data.qpos[0] - begin) * 2 * mu * G / speed**2 - 1)
 
 
-def precessing(step: float, way: dict[str, Any], leans: float = 20.0) -> float:
-    """Euler's disc, which rolls round on its rim while its centre rests: what its energy changes by
-    in 2 s, relative. (Moffatt, Nature 404, 2000, has its speed.)"""
+def precessing(
+    step: float, way: dict[str, Any], leans: float = 20.0, lasts: float = 2.0
+) -> tuple[float, float]:
+    """Euler's disc, a thin one that rolls round on its rim while its centre rests: what its energy
+    changes by, relative, and by how many degrees it leans more. (Moffatt, Nature 404, 2000, has its
+    speed about the vertical, sqrt(4 g/(a sin)).)"""
     angle, radius, thick = math.radians(leans), 0.05, 3e-4
     lowest = radius * math.sin(angle) + thick * math.cos(angle)
-    disc = f'<geom type="cylinder" size="{radius} {thick}" mass=".2"/>'
+    disc = f'type="cylinder" size="{radius} {thick}" mass=".2"'
     data, stepper = start(model := one(disc, 1.0, height=lowest, step=step), **way)
     data.qpos[[3, 5]] = math.cos(angle / 2), math.sin(angle / 2)
     data.qvel[3] = -math.sqrt(4 * G * math.sin(angle) / radius)
     energies = []
-    for seconds in (0, 2):
+    for seconds in (0, lasts):
         stepper.step(data, round(seconds / step))
         for update in (mujoco.mj_forward, mujoco.mj_energyPos, mujoco.mj_energyVel):
             update(model, data)
         energies.append(float(data.energy.sum()))
-    return energies[1] / energies[0] - 1
+    now = math.degrees(math.acos(abs(data.xmat[1, 8])))
+    return energies[1] / energies[0] - 1, now - leans
 
 
 def sliding() -> Rows:
@@ -330,7 +334,7 @@ def sliding() -> Rows:
             [
                 "disc that rolls round on its rim at 20° (Euler's): energy after 2 s, change",
                 f"{1e3 * step:g}",
-                *(f"{precessing(step, way):+.1e}" for way in ways.values()),
+                *(f"{precessing(step, way)[0]:+.1e}" for way in ways.values()),
             ],
         ]
     return [rows[0], *sorted(rows[1:], key=lambda row: [r[0] for r in rows].index(row[0]))]
