@@ -71,5 +71,13 @@ def started(*words: object, **how: Any) -> subprocess.Popen[str]:
     )
 
 
+def python(*words: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """A Python of its own, which must end well, with what it prints and says of trouble."""
+    env = os.environ | {"PYTHONPATH": str(ROOT)} | environment
+    done = subprocess.run([sys.executable, *words], env=env, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done
+
+
 def parser_of(command: str) -> options.Parser:
     return parsers.parser([command])._subparsers._group_actions[0].choices[command]

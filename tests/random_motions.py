@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from model import Parameters, State
+from model import Case, Parameters, State
+from model.cases import TRAITS
 
 P = Parameters.named("reference")
 UNIT = math.sqrt(P.g / P.R)
@@ -38,3 +39,12 @@ def random_start(seed: int, on_wall: bool = False) -> tuple[Parameters, State]:
     if rng.random() < 0.2 and not on_wall:
         x = x._replace(h=rng.uniform(0, 0.9) * P.R, v_h=rng.normal() * speed)
     return p, x
+
+
+def random_state(case: Case, rng: np.random.Generator, p: Parameters) -> State:
+    """A state of a case."""
+    values = State(*rng.normal(size=8) * [0.1, 0.3, 10, 20, 20, 20, 0, 0.3])
+    values = values._replace(y=abs(values.y), h=p.R * rng.uniform(0.1, 0.9))
+    active = TRAITS[case].active
+    x = State(*(v if n in active else 0.0 for n, v in values._asdict().items()))
+    return x._replace(slip_z=-x.v_h / p.r) if case is Case.RN else x

@@ -11,10 +11,10 @@ from analytic.mechanics import drag, dynamics, rigid_body, rolling_forces
 from analytic.simulation import coordinates, equations, motion
 from analytic.simulation.motion import HybridState
 from analytic.simulation.settings import Settings
-from model import Case, Contact, Flow, Parameters, State
-from model.cases import TRAITS
+from model import Case, Contact, Flow, Parameters
 from model.drag import LAWS
-from model.kinematics import VARIABLES, slip_velocities
+from model.kinematics import slip_velocities
+from tests.random_motions import random_state
 
 P = Parameters.named("reference").replace(omega_0=17.0, mu=0.3, eta=0.45, nu_f=1e-5)
 FLOW = Flow.sine(17.0, 4.0, 1.5)
@@ -28,13 +28,7 @@ def moments(case, p):
     """Moments with random states of a case."""
     rng = np.random.default_rng(int(case))
     for _ in range(20):
-        values = dict(
-            zip(VARIABLES, rng.normal(size=8) * [0.1, 0.3, 10, 20, 20, 20, 0, 0.3], strict=True)
-        )
-        values |= {"y": abs(values["y"]), "h": p.R * rng.uniform(0.1, 0.9)}
-        x = State(*[values[n] if n in TRAITS[case].active else 0.0 for n in VARIABLES])
-        if case is Case.RN:
-            x = x._replace(slip_z=-x.v_h / p.r)
+        x = random_state(case, rng, p)
         (A_x, _, A_z), (_, B_y, B_z) = slip_velocities(x.stacked(), p)
         alpha = math.atan2(-A_z, A_x) if case.A is Contact.S else math.nan
         beta = math.atan2(B_z, -B_y) if case.B is Contact.S else math.nan

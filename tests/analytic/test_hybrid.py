@@ -14,6 +14,7 @@ from model import Case, Flow, Parameters
 from model.cases import TRAITS
 from model.drag import LAWS
 from model.kinematics import VARIABLES
+from tests.random_motions import random_state
 
 P = Parameters.named("reference")
 RTOL = 1e-9
@@ -29,21 +30,11 @@ def changes(run):
 STEP, RAMP = 1e-6, Flow.ramp(17.0, 20.0, 1.0)
 
 
-def start(case, rng):
-    """A random state of the case."""
-    values = dict(
-        zip(VARIABLES, rng.normal(size=8) * [0.1, 0.3, 10, 20, 20, 20, 0, 0.3], strict=True)
-    )
-    values |= {"y": abs(values["y"]), "h": P.R * rng.uniform(0.1, 0.9)}
-    x = np.array([values[name] if name in TRAITS[case].active else 0.0 for name in VARIABLES])
-    return x + (case is Case.RN) * np.eye(8)[5] * -x[7] / P.r
-
-
 def lasting(case, p):
     """Motions in which the forces allow the case."""
     rng = np.random.default_rng(1)
     for _ in range(200):
-        run = simulate(p, start(case, rng), 2 * STEP, RAMP, sample_interval=STEP)
+        run = simulate(p, random_state(case, rng, p), 2 * STEP, RAMP, sample_interval=STEP)
         if set(run.cases) == {case} and not len(run.events):
             yield run
 

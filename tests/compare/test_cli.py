@@ -17,7 +17,7 @@ from compare.catalogue import CLAIMS
 from compare.commands import cli, design, parsers, simulate
 from compare.kit import engines, tasks
 from model import Parameters, storage
-from tests.commands import ROOT, carried_out, parser_of, refused, told
+from tests.commands import ROOT, carried_out, parser_of, python, refused, told
 
 
 @pytest.mark.parametrize(
@@ -75,9 +75,7 @@ def test_predict_waits_for_no_heavy_package():
         "import sys; from compare.commands import cli; cli.main(['predict']); "
         "print(*sys.modules, file=sys.stderr)"
     )
-    loaded = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
-    ).stderr.split()
+    loaded = python("-c", code).stderr.split()
     assert "analytic.stationary.solutions" in loaded
     assert not {"h5py", "matplotlib", "mujoco", "numba", "scipy"} & set(loaded)
 
@@ -92,15 +90,13 @@ for name in ("analytic", "mjsim", "compare.testing"):
 """
 
 
-def test_a_foreign_model_is_named(tmp_path):
+def test_a_foreign_model_is_named(tmp_path, monkeypatch):
     (tmp_path / "model.py").touch()
-    how = {"cwd": tmp_path, "capture_output": True, "text": True, "check": True}
-    where = {**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"}
-    said = subprocess.run([sys.executable, "-c", FOREIGN], env=where, **how).stdout.splitlines()
+    monkeypatch.chdir(tmp_path)
+    said = python("-c", FOREIGN, PYTHONPATH=f"{tmp_path}{os.pathsep}{ROOT}").stdout.splitlines()
     hides = f"{tmp_path / 'model.py'} hides the package model of dualball: rename"
     assert [line.startswith(hides) for line in said] == [True] * 3
-    own = {**os.environ, "PYTHONPATH": str(ROOT)}
-    subprocess.run([sys.executable, "-m", "compare", "--version"], env=own, **how)
+    python("-m", "compare", "--version")
 
 
 def test_a_run_is_described_as_it_is_stored_whole_and_in_parts(tmp_path, monkeypatch, capsys):
@@ -240,6 +236,7 @@ def test_claims_and_parameters_are_listed_once(monkeypatch, capsys):
 
 
 COMPLETED = {
+    "dualball sim": "simulate",
     "dualball predict --set stee": "steel-in-water",
     "dualball predict --drag sch": "schiller-naumann",
     "dualball simulate --engine mujoco-pl": "mujoco-plain",
@@ -259,19 +256,14 @@ def test_shells_complete_commands_and_options(tmp_path, monkeypatch, capsys):
         text = capsys.readouterr().out
         assert "sample-interval" in text
     (tmp_path / "bash").write_text(text)
-    words = (
-        "source ./bash; COMP_WORDS=(dualball sim); COMP_CWORD=1; _shtab_dualball; echo "
-        "${COMPREPLY[@]}"
+    asked = "".join(
+        f"COMP_WORDS=({line}); COMP_CWORD={line.count(' ')}; COMPREPLY=(); _shtab_dualball\n"
+        'echo "${COMPREPLY[@]}"\n'
+        for line in COMPLETED
     )
-    assert (
-        subprocess.run(["bash", "-c", words], cwd=tmp_path, capture_output=True, text=True).stdout
-        == "simulate\n"
-    )
-    for line, found in COMPLETED.items():
-        words = line.split(" ")
-        at = f"COMP_WORDS=({line}); COMP_CWORD={len(words) - 1}"
-        words = f"source ./bash; {at}; _shtab_dualball; echo ${{COMPREPLY[@]}}"
-        done = subprocess.run(["bash", "-c", words], cwd=tmp_path, capture_output=True, text=True)
-        assert found in done.stdout.split(), line
+    words = ["bash", "-c", f"source ./bash\n{asked}"]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True)
+    for (line, found), offered in zip(COMPLETED.items(), done.stdout.splitlines(), strict=True):
+        assert found in offered.split(), line
     monkeypatch.setitem(sys.modules, "shtab", None)
     assert "pip install shtab" in refused(capsys, "--print-completion", "bash")

@@ -12,7 +12,7 @@ import sys
 import pytest
 
 from model import storage
-from tests.commands import ROOT, SCENE, carried_out, refused
+from tests.commands import ROOT, SCENE, carried_out, python, refused
 
 
 @pytest.fixture(scope="module")
@@ -67,16 +67,15 @@ def test_any_backend_and_no_home(here):
     assert (here / "run ü.png").stat().st_size > 10_000
 
 
-def test_numbers_are_worked_out_in_one_thread():
+def test_numbers_are_worked_out_in_one_thread(monkeypatch):
     """On a machine with other work two of OpenBLAS took five times as long as one."""
     code = (
         "import atexit, os, sys; from compare.commands import cli; sys.argv[1:] = ['predict'];"
         "atexit.register(lambda: print(len(os.listdir('/proc/self/task')))); cli.program()"
     )
-    mine = {name: value for name, value in os.environ.items() if "NUM_THREADS" not in name}
-    own = mine | {"PYTHONPATH": str(ROOT)}
-    done = subprocess.run([sys.executable, "-c", code], env=own, capture_output=True, check=True)
-    assert done.stdout.splitlines()[-1] == b"1"
+    for name in [name for name in os.environ if "NUM_THREADS" in name]:
+        monkeypatch.delenv(name)
+    assert python("-c", code).stdout.splitlines()[-1] == "1"
 
 
 @pytest.mark.slow

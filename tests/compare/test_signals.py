@@ -17,7 +17,7 @@ import pytest
 import mjsim
 from compare.commands import cli, signals, simulate
 from model import Parameters
-from tests.commands import COMMANDS, carried_out, started
+from tests.commands import COMMANDS, carried_out, python, started
 
 SIGNALS = signal.SIGINT, signal.SIGTERM
 P = Parameters.named("reference")
@@ -169,8 +169,7 @@ for name, call in calls.items():
 
 def test_ctrl_c_ends_every_long_call() -> None:
     """In a process of its own: one that answers while numba makes a result would crash it."""
-    done = subprocess.run([sys.executable, "-c", INTERRUPTED], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    done = python("-c", INTERRUPTED)
     names = ("event", "time-stepping", "many", "mjsim", "mjsim soft", "mjsim many", "attractors")
     assert done.stdout.splitlines() == [f"{name} True" for name in names]
     assert "Traceback" not in done.stderr

@@ -30,13 +30,10 @@ print("holds")
 """
 
 
-def serves(before: str) -> str:
-    """What holds a box on a slope in a Python of its own."""
-    done = subprocess.run(
-        [sys.executable, "-c", before + HOLDS], cwd=ROOT, capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout.strip()
+def held(before: str) -> subprocess.CompletedProcess[str]:
+    """A box on a slope is, in a Python of its own."""
+    words = [sys.executable, "-c", before + HOLDS]
+    return subprocess.run(words, cwd=ROOT, capture_output=True, text=True)
 
 
 NAME = f"MuJoCo {mujoco.__version__}"
@@ -59,9 +56,7 @@ STRUCTS = "import mujoco.introspect.structs as s; d = s.STRUCTS['mjData']; d.fie
     ],
 )
 def test_another_mujoco_is_named(before, says):
-    done = subprocess.run(
-        [sys.executable, "-c", before + HOLDS], cwd=ROOT, capture_output=True, text=True
-    )
+    done = held(before)
     assert done.returncode == 1
     assert len(done.stderr.splitlines()[-1]) < 160
     assert re.search(says, done.stderr.splitlines()[-1])
@@ -74,7 +69,8 @@ def test_compiled_loops_need_no_place_for_a_cache():
         "for name in 'CacheImpl', '_CacheImpl', 'CompileResultCacheImpl':\n"
         "    vars(caching).get(name, type('', (), {}))._locator_classes = []\n"
     )
-    assert serves(before) == "holds"
+    done = held(before)
+    assert done.stdout.strip() == "holds", done.stderr
 
 
 def test_both_wheels_have_one_version():
