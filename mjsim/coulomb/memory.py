@@ -139,6 +139,7 @@ MEMORY = np.dtype(
         *((name, _i8) for name in ("address", "model", "data")),  # of this, mjModel and mjData
         ("nv", _i8),
         *((name, _f8) for name in ("time", "timestep", "called")),  # of the last step, call; s
+        ("known", _i8),  # whether as that step began the one before it was known
         ("bounces", _i8),  # how many geoms have a restitution: all or none
         ("least", _f8),  # distance by which contacts move at least where points are put back, m
         # counts: contacts now and before; rows; those of dry friction, now and before; bodies
@@ -336,7 +337,7 @@ class Simulation:
         record = self.record
         record["contacts"], record["dry"] = len(contacts), len(joints)
         record["time"], record["timestep"] = state["time"]
-        record["called"] = state["time"][0]
+        record["called"], record["known"] = state["time"][0], 1
         record["pending"], record["stored"], record["ncon"], record["resets"] = 0, 1, -1, -1
 
 

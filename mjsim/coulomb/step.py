@@ -137,8 +137,8 @@ def find_references(model: Any, data: Any, memory: Any, gravity: float, since: f
 def begin(model: Any, data: Any, memory: Any) -> Any:
     """Whether the last step is known; whether it is over; the time since the last call, s.
 
-    Stages of Runge and Kutta, and `mj_forward`, are calls within a step. A jump of time, or a reset
-    by MuJoCo, ends what is known.
+    Stages of Runge and Kutta, and `mj_forward`, are calls within a step, which know what it knew as
+    it began. A jump of time, or a reset by MuJoCo, ends what is known.
     """
     warnings, resets = data.warning, 0
     for i in range(len(WARNINGS)):
@@ -150,6 +150,8 @@ def begin(model: Any, data: Any, memory: Any) -> Any:
         conclude(model, data, memory)
     if over or not known:
         memory.time, memory.timestep, memory.resets = data.time, model.opt.timestep, resets
+        memory.known = known
+    known = memory.known != 0
     memory.called = data.time
     start, last = reals(data.qacc_warmstart, model.nv), reals(data.qacc, model.nv)
     touched = memory.law.rigid or data.ncon > 0

@@ -481,13 +481,7 @@ def rolled_out(rigid, steps):
     print("equal" if all((end == ends[0]).all() for end in ends) else "unequal")
 
 
-ONE_STEP = pytest.mark.xfail(
-    reason="a state set at the very time of the last step counts as a call within that",
-    strict=False,
-)
-
-
-@pytest.mark.parametrize("steps", [40, pytest.param(1, marks=ONE_STEP)])
+@pytest.mark.parametrize("steps", [40, 1])
 def test_rollouts_of_equal_starts_are_equal(alone, steps):
     assert alone(rolled_out, [False, steps], [True, steps]) == ["equal", "equal"]
 
