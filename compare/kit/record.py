@@ -13,12 +13,12 @@ import functools
 import json
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 
@@ -241,6 +241,10 @@ Sets = Mapping[str, Parameters]
 """What a protocol measures, by name."""
 Measured = Iterator[Measurement | Missing]
 """What it yields."""
+T = TypeVar("T")
+Found = Generator[Missing, None, T]
+"""What a step of a protocol comes to, as in ``results = yield from carry_out(runner, pairs)``; what
+is missing for it is yielded, and so goes to the protocol's rows."""
 RecordsByEngine = Mapping[str, Mapping[int, Records]]
 """What each engine measured, the one on trial first; by its time steps in one."""
 _OWN = ("protocol", "quantity", "value", "uncertainty", "unit", "engine", "set")

@@ -6,14 +6,14 @@ change, whose uncertainty is what the step and the degree change."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Unpack
 
 import numpy as np
 
 from compare.kit.conditions import Conditions
-from compare.kit.record import Measurement, Missing
+from compare.kit.record import Found, Measurement, Missing
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.statistics import Estimate, uniform
@@ -47,8 +47,8 @@ class StepPair(Start):
     read: Callable[..., Any] = lambda run: run
     """What is read from the runs with one time step."""
     flow: Flow | None = None
-    variants: tuple[Parameters, ...] = ()
-    """Parameters of the runs that are read together; empty for one run with those of the start."""
+    together: tuple[StepPair, ...] = ()
+    """Motions in the place of this one that are read together: other parameters, starts, flows."""
     at: Conditions = field(default_factory=Conditions)
     """Of all measurements of this pair."""
     rows: int = 1
@@ -86,23 +86,25 @@ class StepPairResult:
         return self.runner.missing(self.pair.set, why, self.pair.rows)
 
 
-def carry_out(runner: Runner, pairs: Iterable[StepPair]) -> Iterator[StepPairResult | Missing]:
-    """Run all pairs, and read each; or say which of its runs broke down."""
+def carry_out(runner: Runner, pairs: Iterable[StepPair]) -> Found[list[StepPairResult]]:
+    """Run all pairs, and read each; those of which a run broke down are missing."""
     tasks: list[tuple[StepPair, list[Task]]] = []
     for pair in pairs:
         tasks.append((pair, []))
         for step in (coarse_step(pair.p) / divisor for divisor in pair.divisors):
             samples = pair.samples or round(pair.t_end / step)
-            for p in pair.variants or (pair.p,):
-                task = runner.task(p, pair.x0, pair.t_end, step, flow=pair.flow, samples=samples)
+            for one in pair.together or (pair,):
+                task = runner.task(one.p, one.x0, pair.t_end, step, flow=one.flow, samples=samples)
                 tasks[-1][1].append(task)
+    results = []
     for (pair, own), runs in zip(tasks, runner.groups([own for _, own in tasks]), strict=True):
         if isinstance(runs, str):
             yield runner.missing(pair.set, f"{pair.name}: the run {runs}", pair.rows)
         else:
             each = len(runs) // len(pair.divisors)
             reads = [pair.read(*runs[k : k + each]) for k in range(0, len(runs), each)]
-            yield StepPairResult(runner, pair, own, reads)
+            results.append(StepPairResult(runner, pair, own, reads))
+    return results
 
 
 EXTRAPOLATION, DOUBT = 1 / 2, 1 / math.sqrt(12)

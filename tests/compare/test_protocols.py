@@ -169,7 +169,7 @@ def test_every_deviation_is_measured_and_there_is_none_where_the_laws_hold():
     }
 
     def found(law, contact, **changes):
-        of = moving.deviations([motion(ROUGH, np.linspace(0.0, 1.0, SAMPLES), **right | changes)])
+        of = moving.deviations(motion(ROUGH, np.linspace(0.0, 1.0, SAMPLES), **right | changes))
         return next(
             value
             for (_, name, point), value in of.items()

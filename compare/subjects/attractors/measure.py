@@ -28,7 +28,7 @@ from compare.kit.conditions import Conditions, state_of
 from compare.kit.engines import MOREAU
 from compare.kit.programme import Protocol
 from compare.kit.quantities import QUANTITIES
-from compare.kit.record import Measured, Missing, Records, Sets, if_found
+from compare.kit.record import Measured, Records, Sets, if_found
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.settling import settled_readings
@@ -90,10 +90,10 @@ def _hopping(runner: Runner, shares: Sequence[float], divisors: tuple[int, int])
     pair = StepPair(
         SET, p, "hops", TOP.stacked(), lasts, divisors, round(lasts / SAMPLE), flow=flow
     )
-    (result,) = carry_out(runner, [pair])
-    if isinstance(result, Missing):
-        yield result
+    results = yield from carry_out(runner, [pair])
+    if not results:
         return
+    (result,) = results
     heights = []
     for k, omega_0 in enumerate(flows):
         q, end = p.replace(omega_0=omega_0), (k + 1) * HOLD
@@ -293,11 +293,10 @@ def swing(runner: Runner, sets: Sets, records: Records) -> Measured:
     p = sets["reference"].replace(mu=2.5, eta=0.38, c=1.0, omega_0=24.648)
     x0 = State(omega_c=22.39, slip_x=-0.03, slip_z=0.26).stacked()
     pair = StepPair("reference", p, "swing", x0, SWINGING, (60, 80), 12_000)
-    (result,) = carry_out(runner, [pair])
-    end = SWINGING - SWUNG
-    if isinstance(result, Missing):
-        yield result
+    results = yield from carry_out(runner, [pair])
+    if not results:
         return
+    (result,), end = results, SWINGING - SWUNG
     if any(np.any(run.case[run.time > end] != Case.SS) for run in (result.coarse, result.fine)):
         yield runner.missing("reference", "the ball does not slip at both points for ever")
         return

@@ -25,7 +25,7 @@ from numpy.polynomial import Polynomial
 from compare.kit import settling
 from compare.kit.conditions import Conditions, state_of
 from compare.kit.programme import Protocol
-from compare.kit.record import Measured, Measurement, Missing, Records, Sets, if_found
+from compare.kit.record import Measured, Measurement, Records, Sets, if_found
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.settling import SettlingCriteria, SteadyState
@@ -261,10 +261,7 @@ def unloading(runner: Runner, sets: Sets, records: Records) -> Measured:
             else:
                 pairs += [_pair(runner, state, name) for name in names]
     kinds: dict[Shown, list[tuple[StepPairResult, Estimate, float]]] = {}
-    for result in carry_out(runner, pairs):
-        if isinstance(result, Missing):
-            yield result
-            continue
+    for result in (yield from carry_out(runner, pairs)):
         name, (before, coarse), (case, fine) = result.pair.name, result.coarse, result.fine
         if name != LANDING and before is case:
             yield result.row("case", case)

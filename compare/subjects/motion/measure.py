@@ -31,7 +31,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import product
 from typing import NamedTuple
@@ -41,7 +41,7 @@ import numpy as np
 from compare.kit.conditions import Conditions, state_of
 from compare.kit.conditions import FluidConditions as Fluid
 from compare.kit.programme import Protocol
-from compare.kit.record import Measured, Missing, Records, Sets
+from compare.kit.record import Found, Measured, Records, Sets
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.settling import PRESSES, forces, settled_readings
@@ -96,71 +96,50 @@ def laws(runner: Runner, sets: Sets, records: Records) -> Measured:
 
 def _contact_laws(runner: Runner, sets: Sets) -> Measured:
     """How far each law of contact is off at its worst."""
-    tasks, divisors = [], runner.sampling.laws_divisors
-    for p in sets.values():
+    pairs, divisors = [], runner.sampling.laws_divisors
+    for name, p in sets.items():
         t_end, fast = RUN_LENGTH * coarse_step(p), 3.0 / time_unit(p)
         up = Flow.sampled([0.0, 0.3 * t_end, 0.7 * t_end], [0.0, fast / 3, fast])
         down = Flow.sampled([0.0, 0.2 * t_end, 0.6 * t_end], [fast, fast, fast / 4])
         half = Flow.steady(fast / 2)
-        starts = (
-            (up, State()),
-            (down, State(y=2 * p.R, omega_c=fast)),
-            (half, State(omega_c=fast / 3, h=p.R / 2)),
-        )
-        tasks.append(
-            [
-                runner.task(p, x, t_end, coarse_step(p) / parts, flow=flow, samples=RUN_LENGTH)
-                for parts, (flow, x) in product(divisors, starts)
-            ]
-        )
-    for (name, p), own, runs in zip(sets.items(), tasks, runner.groups(tasks), strict=True):
-        if isinstance(runs, str):
-            yield runner.missing(name, f"the run {runs}")
-            continue
-        coarse, fine = deviations(runs[: len(runs) // 2]), deviations(runs[len(runs) // 2 :])
+        x0, on_wall = State().stacked(), State(y=2 * p.R, omega_c=fast).stacked()
+        on_floor = State(omega_c=fast / 3, h=p.R / 2).stacked()
+        pair = StepPair(name, p, "laws", x0, t_end, divisors, RUN_LENGTH, deviations, up)
+        others = replace(pair, x0=on_wall, flow=down), replace(pair, x0=on_floor, flow=half)
+        pairs.append(replace(pair, together=(pair, *others)))
+    for result in (yield from carry_out(runner, pairs)):
+        coarse, fine = result.coarse, result.fine
         for law, value in fine.items():
             if math.isnan(value) or math.isnan(coarse[law]):
-                yield runner.missing(name, f"no sample at {law.contact} to test: {law.law}", 0)
+                why = f"no sample at {law.contact} to test: {law.law}"
+                yield runner.missing(result.pair.set, why, 0)
                 continue
             # Halving the step may by chance change little: the larger change of the two contacts
             # counts.
             changes = [abs(fine[k] - coarse[k]) for k in fine if k[:2] == law[:2]]
             sure = estimate(value, time_step=float(np.nanmax(changes)), rounding=ROUNDING)
-            at = Conditions(law=law.law, contact=law.contact)
-            yield runner.measurement(name, p, law.quantity, sure, own[len(own) // 2 :], **at)
+            yield result.row(law.quantity, sure, law=law.law, contact=law.contact)
 
 
 def _sinking(runner: Runner) -> Measured:
     """The speed at which balls sink in the middle of still fluid, off floor and wall."""
-    balls = {
-        name: Parameters.from_fluid(**fluid, R=5 * fluid["r"], mu=0.2, eta=0.2)
-        for name, fluid in FLUIDS.items()
-    }
-    falls, divisors = [], runner.sampling.laws_divisors
-    for p in balls.values():
-        step, rest = coarse_step(p), State(y=100 * p.R, h=p.R / 2)
-        falling = rest._replace(v_y=-math.sqrt(p.g * p.R))
-        falls.append(
-            [
-                runner.task(p, x, 64 * step, step / parts, samples=64)
-                for parts, x in product(divisors, (rest, falling))
-            ]
-        )
-    for (name, p), own, runs in zip(balls.items(), falls, runner.groups(falls), strict=True):
-        if isinstance(runs, str):
-            yield runner.missing(name, f"the run {runs}")
-            continue
-        (before, _), (speed, lasts) = _sinking_speed(*runs[:2]), _sinking_speed(*runs[2:])
+    pairs, divisors = [], runner.sampling.laws_divisors
+    for name, fluid in FLUIDS.items():
+        p = Parameters.from_fluid(**fluid, R=5 * fluid["r"], mu=0.2, eta=0.2)
+        t_end, rest = 64 * coarse_step(p), State(y=100 * p.R, h=p.R / 2)
+        falling = rest._replace(v_y=-math.sqrt(p.g * p.R)).stacked()
+        pair = StepPair(name, p, "sinks", rest.stacked(), t_end, divisors, 64, _sinking_speed)
+        pairs.append(replace(pair, together=(pair, replace(pair, x0=falling))))
+    for result in (yield from carry_out(runner, pairs)):
+        name, (before, _), (speed, lasts) = result.pair.set, result.coarse, result.fine
         # What is left of a fall that has only just begun is a difference of speeds, each of them
         # rounded in every step.
-        rounding = ROUNDING * abs(speed) / (p.c * lasts)
+        rounding = ROUNDING * abs(speed) / (result.pair.p.c * lasts)
         sinking = estimate(speed, time_step=abs(speed - before), rounding=rounding)
-        yield runner.measurement(
-            name, p, "v_y", sinking, own[2:], case="NN", by=name, **FLUIDS[name]
-        )
+        yield result.row("v_y", sinking, case="NN", by=name, **FLUIDS[name])
 
 
-def deviations(runs: Sequence[Trajectory]) -> dict[ContactLaw, float]:
+def deviations(*runs: Trajectory) -> dict[ContactLaw, float]:
     """How far runs are from every law, dimensionless; nan where no sample can show it."""
 
     def largest(values: Array, off: float) -> float:
@@ -267,9 +246,7 @@ def field(runner: Runner, sets: Sets, records: Records) -> Measured:
                 speed, Re = math.hypot(v_h, v_y, (p.R - h) * (omega_c - omega_0)), (3e3, 3e4)[k]
                 fast = q.replace(nu_f=2 * p.r * speed / Re, c=24 / (p.C_D * Re * unit))
                 pairs.append(replace(pairs[-1], p=fast))
-    found = list(carry_out(runner, pairs))
-    yield from (each for each in found if isinstance(each, Missing))
-    results = [each for each in found if not isinstance(each, Missing)]
+    results = yield from carry_out(runner, pairs)
     kept = Counter[tuple[str, float, Case]]()
     for centre, result in product(WINDOW_CENTRES, results):
         case = Case(int(result.coarse.case[centre * runner.sampling.field_steps[1]]))
@@ -415,8 +392,8 @@ def motions(runner: Runner, sets: Sets, records: Records) -> Measured:
             yield runner.measurement(name, p, "case", case, [task], **at)
             divisors = STEP_RATIO // 2, STEP_RATIO, 2 * STEP_RATIO
             again.append(StepPair(name, p, case.name, x, time, divisors, at=at, rows=TURNS))
-    for result in carry_out(runner, again):
-        yield from [result] if isinstance(result, Missing) else _turns_at_end(result)
+    for piece in (yield from carry_out(runner, again)):
+        yield from _turns_at_end(piece)
     for name, cases in seen.items():
         if unseen := [case.name for case in Case if case not in cases]:
             yield runner.missing(name, f"no piece of a motion ended in {', '.join(unseen)}", 0)
@@ -543,19 +520,13 @@ def impacts(runner: Runner, sets: Sets, records: Records) -> Measured:
             pairs.append(pair)
     rebounds, tasks = dict.fromkeys(sets, 0), {name: list[Task]() for name in sets}
     landed = list[tuple[StepPairResult, int, float]]()
-    for landing in carry_out(runner, pairs):
-        if isinstance(landing, Missing):
-            yield landing
-            continue
+    for landing in (yield from carry_out(runner, pairs)):
         tasks[landing.pair.set] += landing.tasks
         for run in (landing.coarse, landing.fine):
             gap = run.y if landing.pair.name.startswith("floor") else run.h
             low = int(np.argmax(np.append(np.diff(gap) >= 0, True)))
             rebounds[landing.pair.set] += bool(gap[low:].max() > gap[low] + 1e-2 * landing.pair.p.R)
-        found = _after_landing(landing)
-        if isinstance(found, Missing):
-            yield found
-        else:
+        if found := (yield from _after_landing(landing)):
             landed.append((landing, *found))
     for landing, at, change in landed:
         # By chance a contact may close alike with both steps: what others show counts, too.
@@ -573,16 +544,17 @@ def impacts(runner: Runner, sets: Sets, records: Records) -> Measured:
         yield runner.measurement(name, p, "rebounds", count, tasks[name])
 
 
-def _after_landing(landing: StepPairResult) -> tuple[int, float] | Missing:
+def _after_landing(landing: StepPairResult) -> Found[tuple[int, float] | None]:
     """The sample six coarse steps after a landing, and the largest change of what it changes, in
     natural units, with half the step."""
     pair, coarse, fine = landing.pair, landing.coarse, landing.fine
     contact = [case.A if pair.name.startswith("floor") else case.B for case in coarse.cases]
     at = next((k for k, each in enumerate(contact) if each is not Contact.N), len(contact)) + 6
     if at >= len(contact) or coarse.case[at] != fine.case[2 * at]:
-        return landing.missing(
+        yield landing.missing(
             f"{pair.name}: the contact did not close for good within 0.4 sqrt(R/g)"
         )
+        return None
     changes = np.abs(fine.x[2 * at] - coarse.x[at]) / state_units(pair.p)
     return at, float(changes[[VARIABLES.index(name) for name in LANDED]].max())
 
@@ -622,10 +594,8 @@ def torque(runner: Runner, sets: Sets, records: Records) -> Measured:
 
 def whole_runs(runner: Runner, sets: Sets, records: Records) -> Measured:
     """Where each start ends: its state; on smooth walls, rough floors case and orbit."""
-    for run in carry_out(runner, [pair for name, p in sets.items() for pair in _pairs(name, p)]):
-        if isinstance(run, Missing):
-            yield run
-            continue
+    pairs = [pair for name, p in sets.items() for pair in _pairs(name, p)]
+    for run in (yield from carry_out(runner, pairs)):
         p, how, coarse, fine = run.pair.p, run.pair.name, run.coarse, run.fine
         time = float(fine.time[-1])
         if coarse.case[-1] != fine.case[-1]:

@@ -28,7 +28,7 @@ from compare.kit.brackets import Attempt, Bracket, Search, narrow
 from compare.kit.conditions import Conditions
 from compare.kit.levels import Level
 from compare.kit.programme import Protocol
-from compare.kit.record import Measured, Measurement, Missing, Records, Sets, if_found
+from compare.kit.record import Found, Measured, Measurement, Missing, Records, Sets, if_found
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.settling import (
@@ -171,9 +171,7 @@ def borders(runner: Runner, sets: Sets, records: Records) -> Measured:
         for name, (low, high) in limits.items()
         for part in (CLOSING if name == soonest else runner.sampling.edge_flows)
     ]
-    found = list(_first_lines(runner, flows))
-    yield from (each for each in found if isinstance(each, Missing))
-    edges = [each for each in found if isinstance(each, Edge)]
+    edges = yield from _first_lines(runner, flows)
     for _ in range(runner.sampling.edge_lines):
         lines = [edge.with_next_line() for edge in edges]
         brackets = narrow(runner, [line.search() for line in lines], careful=False)
@@ -191,22 +189,22 @@ def borders(runner: Runner, sets: Sets, records: Records) -> Measured:
             yield runner.missing(name, why)
 
 
-def _first_lines(
-    runner: Runner, flows: Sequence[tuple[str, Parameters]]
-) -> Iterator[Edge | Missing]:
+def _first_lines(runner: Runner, flows: Sequence[tuple[str, Parameters]]) -> Found[list[Edge]]:
     """Edges of sets and flows with the line between the two attractors, as far as these settle."""
     ways = ("rest", "on the wall")
     starts = [[initial_condition(name, p, how) for how in ways] for name, p in flows]
     settled = settle_groups(runner, starts, SettlingCriteria(loose=10.0))
+    edges = []
     for (name, p), (slipping, lifted) in zip(flows, settled, strict=True):
         if slipping.settled_in(Case.SS) and lifted.settled_in(Case.NR, Case.SR):
             # on floor and wall: a lifted ball moves alike at every height
             a, b = (constrained(Case.SS, state.mean, p) for state in (slipping, lifted))
-            yield Edge(runner, name, p, a, b, a, b - a)
+            edges.append(Edge(runner, name, p, a, b, a, b - a))
         else:
             came_to = ", ".join(state.failure or state.case.name for state in (slipping, lifted))
             why = f"no two attractors settled at omega_0 = {p.omega_0:.4g} rad/s: {came_to}"
             yield runner.missing(name, why)
+    return edges
 
 
 def _where_it_begins(near: Sequence[Edge]) -> Measurement | Missing:

@@ -31,7 +31,7 @@ from compare.kit.conditions import Conditions, state_of
 from compare.kit.engines import STUDY_SLIP
 from compare.kit.programme import Protocol
 from compare.kit.quantities import quantity
-from compare.kit.record import Measured, Measurement, Missing, Records, Sets
+from compare.kit.record import Found, Measured, Measurement, Missing, Records, Sets
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.settling import SOLVED, SPIN, physical_case, safe_height
@@ -78,9 +78,9 @@ Exponents = npt.NDArray[np.complex128]
 
 def measure(runner: Runner, sets: Sets, records: Records) -> Measured:
     """All exponents of settled states in the six cases in which a ball can go round for ever."""
-    found = [each for name, p in sets.items() for each in chosen_states(runner, records, name, p)]
-    yield from (each for each in found if isinstance(each, Missing))
-    pushed = [each for each in found if isinstance(each, Pushed)]
+    pushed = list[Pushed]()
+    for name, p in sets.items():
+        pushed += yield from chosen_states(runner, records, name, p)
     for each in pushed:
         if each.too_hard:
             yield each.missing(NOT_LINEAR, 2 * len(each.active) + len(each.active) ** 2)
@@ -212,14 +212,14 @@ class Pushed:
 
 def chosen_states(
     runner: Runner, records: Records, name: str, p: Parameters
-) -> Iterator[Pushed | Missing]:
+) -> Found[list[Pushed]]:
     """States of a set to be pushed: one that spins on the spot next to the wall, and several
     settled ones of each case.
 
     Where there are fewer that can be pushed, the rest is missing."""
     unit = time_unit(p)
     spinning = State(slip_y=SPIN / unit * p.R / p.r).stacked()
-    yield Pushed(runner, Start(name, p.replace(omega_0=0.0), "spinning", spinning), Case.RS)
+    chosen = [Pushed(runner, Start(name, p.replace(omega_0=0.0), "spinning", spinning), Case.RS)]
     values: dict[tuple[Parameters, Case], dict[str, float]] = {}
     for m in records.select("settled", where=lambda m: m.set == name and m.quantity in VARIABLES):
         values.setdefault((m.parameters, physical_case(m.case)), {})[m.quantity] = m.value
@@ -244,11 +244,12 @@ def chosen_states(
             alike = alike[: math.ceil(2 / 3 * len(alike))]
         count = math.ceil(runner.sampling.rates_more * most)
         places = {int((k + 0.5) * len(alike) / count) for k in range(count)} if alike else set()
-        yield from (alike[k] for k in sorted(places))
+        chosen += [alike[k] for k in sorted(places)]
         if (lacking := min(count, len(of)) - len(places)) > 0 or not of:
             why = f"{len(alike)} of {len(of)} settled states of {case.name} slip fast enough for a "
             why += "push"
             yield runner.missing(name, why, max(lacking, 0) * 2 * len(TRAITS[case].active))
+    return chosen
 
 
 def push_response(state: Pushed, size: float, runs: Sequence[Trajectory]) -> Array:

@@ -400,8 +400,8 @@ def jumps(runner: Runner, sets: Sets, records: Records) -> Measured:
             pairs.append(_jump(runner, replace(begun, name="SS"), JUMP / 3 * (holds - begins)))
         else:
             pairs += _ramps(runner, begun, begins, ends)
-    for result in carry_out(runner, pairs):
-        yield from [result] if isinstance(result, Missing) else _rows(result)
+    for result in (yield from carry_out(runner, pairs)):
+        yield from _rows(result)
 
 
 def _rows(result: StepPairResult) -> Measured:
@@ -421,12 +421,12 @@ def _rows(result: StepPairResult) -> Measured:
 def _jump(runner: Runner, start: Start, size: float) -> StepPair:
     """The pair of jumps of the flow up and down, rad s-1, from a state in a case."""
     p, t_end = start.p, rounded_duration(start.p, runner.sampling.unsteady_lasts)
-    sides = tuple(p.replace(omega_0=p.omega_0 + side * size) for side in (1, -1))
     # drag may be weak, and peaks come soon
     samples = max(4000, round(t_end / (4 * coarse_step(p))))
     divisors, read = runner.sampling.unsteady_divisors, _jump_quantities
     both = StepPair(start.set, p, start.name, start.x0, t_end, divisors, samples, read)
-    return replace(both, variants=sides, at=Conditions(case=start.name))
+    sides = tuple(replace(both, p=p.replace(omega_0=p.omega_0 + side * size)) for side in (1, -1))
+    return replace(both, together=sides, at=Conditions(case=start.name))
 
 
 def _ramps(runner: Runner, start: Start, begins: float, ends: float) -> Iterator[StepPair]:
