@@ -36,7 +36,7 @@ class Start:
 
 @dataclass(frozen=True, eq=False)
 class StepPair(Start):
-    """A motion that is run with two time steps, or with three."""
+    """A motion that is run with two time steps, or with three; or with one, for no error."""
 
     t_end: float
     """s"""

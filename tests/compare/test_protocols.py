@@ -60,6 +60,8 @@ PROTOCOLS = {
         runner, SETS, known("reference", P, "omega_01", "omega_02")
     ),
     "lift": lambda runner: slipping.lift(runner, {"rubber-wall": QUICK["rubber-wall"]}, Records()),
+    "laws": lambda runner: moving.laws(runner, SETS, Records()),
+    "motions": lambda runner: moving.motions(runner, SETS, Records()),
     "impacts": lambda runner: moving.impacts(runner, SETS, Records()),
     "pulsation": lambda runner: unsteady.pulsation(
         runner,

@@ -365,19 +365,15 @@ late."""
 
 def motions(runner: Runner, sets: Sets, records: Records) -> Measured:
     """The case at the end of every piece, and how the ball turns there."""
-    starts = [_start(name, p, *start) for name, p in sets.items() for start in STARTS]
-    tasks = []
-    for start in starts:
-        step = coarse_step(start.p) / STEP_RATIO
-        steps = round(6.0 * time_unit(start.p) / step)
-        tasks.append(runner.task(start.p, start.x0, steps * step, step, samples=steps))
+    count, whole, again = runner.sampling.motions_pieces, list[StepPair](), list[StepPair]()
+    for (name, p), start in product(sets.items(), STARTS):
+        begun = _start(name, p, *start, "a motion")
+        step = coarse_step(begun.p) / STEP_RATIO
+        t_end, rows = round(6.0 * time_unit(begun.p) / step) * step, count * (1 + TURNS)
+        whole.append(StepPair(**vars(begun), t_end=t_end, divisors=(STEP_RATIO,), rows=rows))
     seen: dict[str, set[Case]] = {name: set() for name in sets}
-    count, again = runner.sampling.motions_pieces, list[StepPair]()
-    for start, task, run in zip(starts, tasks, runner.each(tasks), strict=True):
-        name, p = start.set, start.p
-        if isinstance(run, str):
-            yield runner.missing(name, f"a motion {run}", count * (1 + TURNS))
-            continue
+    for motion in (yield from carry_out(runner, whole)):
+        name, p, run = motion.pair.set, motion.pair.p, motion.fine
         chosen = pieces(run, count)
         if lacking := count - len(chosen):
             why = "near the ends of pieces the case changes, or a contact hovers, creeps or slips "
@@ -389,7 +385,7 @@ def motions(runner: Runner, sets: Sets, records: Records) -> Measured:
             x = constrained(Case(int(run.case[first])), run.x[first], p)
             time = float(run.time[last] - run.time[first])
             at = Conditions(case=case.name, time=time) | state_of(x)
-            yield runner.measurement(name, p, "case", case, [task], **at)
+            yield motion.row("case", case, **at)
             divisors = STEP_RATIO // 2, STEP_RATIO, 2 * STEP_RATIO
             again.append(StepPair(name, p, case.name, x, time, divisors, at=at, rows=TURNS))
     for piece in (yield from carry_out(runner, again)):
