@@ -11,7 +11,6 @@ import functools
 import itertools
 import math
 import sys
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -23,7 +22,7 @@ from compare.kit.pages import Rows
 from docs.studies.small_scenes import FLOOR, free
 from docs.studies.small_scenes import model as world
 from docs.studies.tables import write_all
-from docs.studies.ways import Plain, Stepper
+from docs.studies.ways import Plain, Stepper, processor_time
 from mjsim import Coulomb
 
 G = 9.81
@@ -158,15 +157,8 @@ def cost(
     for row in times:
         for k, (data, stepper) in enumerate(runs):
             begin(data, stepper)
-            row[k] = processor_time(stepper, data, steps)
+            row[k] = processor_time(functools.partial(stepper.step, data, steps))
     return float(np.median(times[:, 1] / times[:, 0]))
-
-
-def processor_time(stepper: Stepper, data: Any, steps: int) -> float:
-    """Of some steps, s."""
-    begin = time.process_time()
-    stepper.step(data, steps)
-    return time.process_time() - begin
 
 
 def at_rest(count: int, way: dict[str, Any]) -> float:

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import json
 import statistics
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +38,7 @@ from docs.studies.states import (
     Stationary,
     Transient,
 )
+from docs.studies.ways import processor_time
 from mjsim import ContactSettings, RigidContacts
 from model.files import write_text
 
@@ -97,15 +98,13 @@ class Contestant:
         once."""
         task = self.task(APPROACH.run)
         half, file = replace(task, t_end=task.t_end / 2), kept / f"{task.key}.cost.json"
-
-        def seconds(task: Task) -> float:
-            begin = time.process_time()
-            carry_out(task)
-            return time.process_time() - begin
-
         if not file.exists():
-            differences = [seconds(task) - seconds(half) for _ in range(REPEATS)]
-            write_text(file, json.dumps(statistics.median(differences) / half.t_end))
+            took = [
+                [processor_time(partial(carry_out, each)) for each in (task, half)]
+                for _ in range(REPEATS)
+            ]
+            second = statistics.median(whole - first for whole, first in took)
+            write_text(file, json.dumps(second / half.t_end))
         return float(json.loads(file.read_text("utf-8")))
 
 

@@ -29,6 +29,7 @@ from compare.kit.pages import Rows
 from compare.kit.tasks import Task
 from compare.kit.workers import processes
 from docs.studies.tables import write_all
+from docs.studies.ways import processor_time
 from mjsim import scene
 from mjsim.contact_settings import ContactSettings
 from mjsim.engine import Run
@@ -60,16 +61,16 @@ MOTIONS: dict[str, tuple[State, float, Flow]] = {
 """Runs of theory: start, duration, flow."""
 
 
-def seconds(work: Callable[[], Any], clock: Callable[[], float] = time.perf_counter) -> float:
+def seconds(work: Callable[[], Any]) -> float:
     """What some work takes, s."""
-    start = clock()
+    start = time.perf_counter()
     work()
-    return clock() - start
+    return time.perf_counter() - start
 
 
 def quickest(work: Callable[[], Any]) -> float:
     """Processor time, s, of the quickest of some."""
-    return min(seconds(work, time.process_time) for _ in range(REPEATS))
+    return min(processor_time(work) for _ in range(REPEATS))
 
 
 def event_driven() -> Rows:
@@ -229,7 +230,7 @@ def cost(runs: int, steps: int = 2500) -> list[float]:
         loops = itertools.chain(
             *(Run(*start, sample_interval=100 * settings.timestep) for _ in range(runs))
         )
-        whole.append(seconds(partial(list, loops), time.process_time))
+        whole.append(processor_time(partial(list, loops)))
         bare.append(_bare(settled, runs, steps))
     ratios = [
         2 * w / (before + after) for w, before, after in zip(whole, bare, bare[1:], strict=False)
@@ -259,7 +260,7 @@ def _bare(settled: JointedBall, runs: int, steps: int) -> float:
             step()
             azimuth[:] = held
 
-    return seconds(loop, time.process_time)
+    return processor_time(loop)
 
 
 def _campaign(number: int) -> float:

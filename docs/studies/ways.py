@@ -29,6 +29,13 @@ SLIDES = 0.999
 """Share of the cone from which on a contact counts as sliding."""
 
 
+def processor_time(work: Callable[[], object]) -> float:
+    """What some work takes, s."""
+    begin = time.process_time()
+    work()
+    return time.process_time() - begin
+
+
 class Stepper(Protocol):
     """Steps a simulation, at once or in two halves between which a controller may act."""
 
@@ -187,7 +194,7 @@ class Run:
             self._stepper.step(self.data)
         else:
             self._stepper.step1(self.data)
-            self._spent -= self._timed(between)
+            self._spent -= processor_time(between)
             self._stepper.step2(self.data)
         self._spent += time.process_time() - begin
         self._steps += 1
@@ -196,12 +203,6 @@ class Run:
             self._depth = max(self._depth, float(-self.data.contact.dist.min()))
         if self.passive:
             self._energy()
-
-    @staticmethod
-    def _timed(between: Callable[[], None]) -> float:
-        begin = time.process_time()
-        between()
-        return time.process_time() - begin
 
     def _energy(self) -> None:
         mujoco.mj_energyPos(self.model, self.data)

@@ -31,6 +31,12 @@ def run():
     return mjsim.simulate(P.replace(omega_0=25.0), [0, 0, 13.0, 0, 0, 0], 0.8, sample_interval=0.01)
 
 
+def shows(tab, where, text):
+    """Wait until a part of a page has this in its text: theory may be compiled before."""
+    says = "([w, t]) => document.querySelector(w)?.innerText.includes(t)"
+    tab.wait_for_function(says, arg=[where, text], timeout=120_000)
+
+
 def test_a_page_plays_in_a_browser_without_network(tab, run, tmp_path, capsys):
     """Frames, numbers and the case follow the slider; where a contact is open there is no slip to
     tell."""
@@ -44,9 +50,7 @@ def test_a_page_plays_in_a_browser_without_network(tab, run, tmp_path, capsys):
     tab.wait_for_function("document.querySelector('#place').value > 3")  # it plays by itself
     for k, time in ((0, 0.1), (70, 0.8)):
         tab.locator("#place").fill(str(k))
-        tab.wait_for_function(
-            f"document.querySelector('#now').innerText.includes('t = {time:.3f} s')"
-        )
+        shows(tab, "#now", f"t = {time:.3f} s")
         now = geometry.resampled(run, np.array([time]))
         assert tab.locator("#case").inner_text() == Case(now.case[0]).name
         assert f"ωc = {now.omega_c[0]:.2f} rad/s" in tab.locator("#numbers").inner_text()
@@ -55,9 +59,7 @@ def test_a_page_plays_in_a_browser_without_network(tab, run, tmp_path, capsys):
     flies = analytic.simulate(P, [0.05, 0, 8.0, 0, 0, 0, 0.03, -0.3], 0.05)
     page.save(flies, file)
     tab.goto(file.as_uri())
-    tab.wait_for_function(
-        "document.querySelector('#numbers').innerText.includes('slip: floor –, wall –')"
-    )
+    shows(tab, "#numbers", "slip: floor –, wall –")
     seen = Image.open(io.BytesIO(tab.locator("#view").screenshot())).convert("RGB")
     edge = np.asarray(seen)[3:6, seen.width // 2 :]
     assert edge[:, :-20].min() == 255
@@ -164,11 +166,6 @@ def test_what_is_moved_clicked_and_typed_shows_and_is_saved(browser, address, tm
     for tab in (page, other):
         tab.wait_for_selector(".map .nsewdrag", timeout=60_000)
 
-    def shows(text):
-        page.wait_for_function(
-            "t => document.querySelector('.said').innerText.includes(t)", arg=text
-        )
-
     def click(where, x, y, tab=page):
         box = tab.locator(where).bounding_box()
         place = box["x"] + box["width"] * x, box["y"] + box["height"] * y
@@ -176,13 +173,13 @@ def test_what_is_moved_clicked_and_typed_shows_and_is_saved(browser, address, tm
         tab.wait_for_timeout(300)  # plotly looks for the point below when the pointer rests
         tab.mouse.click(*place)
 
-    shows("RR at ωc = 12")
+    shows(page, ".said", "RR at ωc = 12")
     click("[aria-label=omega_0]", 25 / 80, 0.5)
-    shows("SS at ωc = ")
+    shows(page, ".said", "SS at ωc = ")
     click(".map .nsewdrag", 0.5, 0.5)  # eta = 0.6, omega_0 = 40
-    shows("NR at ωc = 40")
+    shows(page, ".said", "NR at ωc = 40")
     click(".curve .nsewdrag", 0.75, 0.25)  # omega_0 = 60, from omega_c = 60
-    shows("NR at ωc = 60")
+    shows(page, ".said", "NR at ωc = 60")
     moving = page.frame_locator(".motion")
     expect(moving.locator("#case")).to_have_text("NR")
     place = moving.locator("#place").input_value()
@@ -208,19 +205,11 @@ def test_what_is_moved_clicked_and_typed_shows_and_is_saved(browser, address, tm
 
 def test_a_link_is_a_setting_and_a_telephone_shows_all(browser, address):
     page = browser.new_page(viewport={"width": 390, "height": 844})
-
-    def shows(where, text):
-        page.wait_for_function(
-            "([w, t]) => document.querySelector(w)?.innerText.includes(t)",
-            arg=[where, text],
-            timeout=120_000,
-        )
-
     page.goto(f"{address}?omega_0=25&eta=0.25&start=5")
-    shows(".said", "SS at ωc = ")
-    shows(".about", "Left out are rolling resistance")
-    shows(".cases", "NR is off the floor, rolls on the wall")
-    shows(".steady", "After 10 s: ")
+    shows(page, ".said", "SS at ωc = ")
+    shows(page, ".about", "Left out are rolling resistance")
+    shows(page, ".cases", "NR is off the floor, rolls on the wall")
+    shows(page, ".steady", "After 10 s: ")
     assert page.locator(".cases svg").count() == len(Case)
     assert page.evaluate("document.documentElement.scrollWidth") == 390
     number = page.locator("input[type=number]").last
@@ -229,7 +218,7 @@ def test_a_link_is_a_setting_and_a_telephone_shows_all(browser, address):
     page.wait_for_function("location.search == '?eta=0.25&start=5'")
     page.goto(f"{address}?mu=-3")
     page.wait_for_selector("text=The address can't be followed: mu = -3 is out of range")
-    shows(".said", "RR at ωc = 12")
+    shows(page, ".said", "RR at ωc = 12")
     page.close()
 
 
@@ -239,10 +228,10 @@ def test_a_browser_that_is_busy_keeps_its_set(browser, address):
     meanwhile."""
     page = browser.new_page()
     page.goto(address)
-    page.wait_for_function("document.querySelector('.said')?.innerText.includes('RR')")
+    shows(page, ".said", "RR")
     number = page.locator("input[type=number]").last
     number.fill("25")
-    page.wait_for_function("document.querySelector('.said').innerText.includes('SS')")
+    shows(page, ".said", "SS")
     page.evaluate("const end = Date.now() + 14e3; while (Date.now() < end);")
     page.wait_for_timeout(3000)
     assert number.input_value() == "25"

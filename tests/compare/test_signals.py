@@ -54,8 +54,11 @@ def catches(process, number):
 
 
 @pytest.fixture(params=SIGNALS)
-def heard(request):
-    """A signal, also where a shell runs the tests in the background, and has SIGINT ignored."""
+def heard(request, monkeypatch):
+    """A signal, also where a shell runs the tests in the background, and has SIGINT ignored; what
+    it waits for it waits for half as long as usual."""
+    monkeypatch.setattr(signals, "_PATIENCE", signals._PATIENCE / 2)
+    monkeypatch.setattr(signals, "_WAITS", signals._WAITS // 2)
     before = signal.signal(request.param, signal.SIG_DFL)
     yield request.param
     signal.signal(request.param, before)
@@ -124,7 +127,6 @@ def test_what_a_stopped_run_leaves_is_told_whatever_comes_next(
         os.kill(os.getpid(), heard)
         return ended(task, path, stop=stop, tell=tell)
 
-    monkeypatch.setattr(signals, "_PATIENCE", 1.0)
     monkeypatch.setattr(simulate, "store", store)
     monkeypatch.setattr(simulate.motions, "describe", describe)
     new = tmp_path / "new.h5"

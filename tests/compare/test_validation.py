@@ -176,7 +176,18 @@ def test_verdicts_are_announced_as_they_come(tmp_path, counted, monkeypatch):
     assert seen[0] != "of-waiting"
 
 
-def test_too_weak_a_drag_keeps_protocols_from_waiting(tmp_path, runner, monkeypatch):
+@pytest.fixture
+def found_by(tmp_path, runner, monkeypatch):
+    """What a protocol finds that has this entry in the plan."""
+
+    def found_by(measure, sets, entry, name="round"):
+        monkeypatch.setitem(PLAN, name, entry)
+        return programme.carry_out(Job(Protocol(name, measure), runner, tmp_path, sets), Records())
+
+    return found_by
+
+
+def test_too_weak_a_drag_keeps_protocols_from_waiting(found_by):
     seen = []
 
     def measure(runner, sets, before):
@@ -185,56 +196,46 @@ def test_too_weak_a_drag_keeps_protocols_from_waiting(tmp_path, runner, monkeypa
 
     named = {name: Parameters.named(name) for name in ("air", "steel-in-water")}
     for settles in (True, False):
-        protocol = Protocol(f"settles-{settles}", measure)
-        monkeypatch.setitem(PLAN, protocol.name, Entry(settles=settles))
-        missing = programme.carry_out(Job(protocol, runner, tmp_path, named), Records()).missing
-        assert [m.set for m in missing] == ["air"] * settles
-        assert all("1/c = 2.39e+03 s, 1.2e+06 time steps" in m.reason for m in missing)
+        found = found_by(measure, named, Entry(settles=settles), f"settles-{settles}")
+        assert [m.set for m in found.missing] == ["air"] * settles
+        assert all("1/c = 2.39e+03 s, 1.2e+06 time steps" in m.reason for m in found.missing)
     assert seen == ["steel-in-water", "air", "steel-in-water"]
 
 
-def test_a_set_of_which_nothing_is_said_is_counted(tmp_path, runner, monkeypatch):
-    monkeypatch.setitem(PLAN, "round", Entry())
-    named = {name: Parameters.named("reference") for name in ("one", "other", "third")}
-
+def test_a_set_of_which_nothing_is_said_is_counted(found_by):
     def measure(runner, sets, before):
-        yield from going_round(runner, {"one": named["one"]}, before)
+        yield from going_round(runner, {"one": sets["one"]}, before)
         yield Missing("round", "other", "it has a reason", 0)
 
-    found = programme.carry_out(Job(Protocol("round", measure), runner, tmp_path, named), Records())
+    found = found_by(measure, dict.fromkeys(("one", "other", "third"), SETS["mine"]), Entry())
     assert found.lost == {("round", "third", ""): 1}
 
 
-def test_what_only_the_reference_shows_is_not_missed_on_other_sets(tmp_path, runner, monkeypatch):
+ALONE = "it is that of the reference"
+
+
+def test_what_only_the_reference_shows_is_not_missed_on_other_sets(found_by):
     """All sets are planned at the default level: its claims came out inconclusive."""
-    monkeypatch.setitem(PLAN, "round", Entry(ONE_BALL, only="it is that of the reference"))
-    named = {name: Parameters.named("reference") for name in ("reference", "other")}
 
     def measure(runner, sets, before):
         yield from going_round(runner, {"reference": sets["reference"]}, before)
 
-    found = programme.carry_out(Job(Protocol("round", measure), runner, tmp_path, named), Records())
+    named = dict.fromkeys(("reference", "other"), SETS["mine"])
+    found = found_by(measure, named, Entry(ONE_BALL, only=ALONE))
     assert found.measurements
     assert not found.lost
 
 
 def test_another_engine_may_measure_and_what_only_the_reference_shows_is_missing_without_it(
-    tmp_path, runner, monkeypatch
+    found_by,
 ):
     for engine in (None, MUJOCO):  # what one measured is not taken for the other's
-        monkeypatch.setitem(PLAN, "round", Entry(by=engine))
-        protocol = Protocol("round", going_round)
-        (row,) = programme.carry_out(
-            Job(protocol, runner, tmp_path, {"mine": SETS["mine"]}), Records()
-        ).measurements
+        (row,) = found_by(going_round, {"mine": SETS["mine"]}, Entry(by=engine)).measurements
         assert row.engine == (engine or EVENT).name
     for name, count in (("mine", 1), ("reference", 0)):
-        protocol = Protocol(f"of-{name}", lambda runner, sets, records: ())
-        monkeypatch.setitem(PLAN, protocol.name, Entry(only="it is that of the reference"))
-        missing = programme.carry_out(
-            Job(protocol, runner, tmp_path, {name: SETS["mine"]}), Records()
-        ).missing
-        assert missing == (Missing(f"of-{name}", name, "it is that of the reference", 0),) * count
+        of = f"of-{name}"
+        found = found_by(lambda *_: (), {name: SETS["mine"]}, Entry(only=ALONE), of)
+        assert found.missing == (Missing(of, name, ALONE, 0),) * count
 
 
 @pytest.mark.parametrize("command", ["validate", "judge"])
