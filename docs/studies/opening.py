@@ -1,13 +1,10 @@
 """The picture that README opens with: ``python -m docs.studies.opening`` draws docs/opening.png.
 
 Above the ball and what it touches; below how fast it goes round, by theory, by MuJoCo under
-Coulomb's law and by MuJoCo as it comes: settled runs from rest, made by the command line."""
+Coulomb's law and by MuJoCo as it comes: settled runs from rest."""
 
 from __future__ import annotations
 
-import subprocess
-import sys
-import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -19,7 +16,8 @@ from matplotlib.patches import Arc, Circle, Rectangle
 
 import analytic
 from compare.kit import style
-from model import Case, Parameters, storage
+from compare.kit.tasks import Task, carry_out
+from model import Case, Parameters, State
 
 PICTURE = Path(__file__).parents[1] / "opening.png"
 FLOWS = (4.0, 8.0, 12.0, 16.0, 20.0, 24.0, 28.0)
@@ -39,13 +37,9 @@ def main() -> None:
 
 def reading(engine: str, flow: float) -> float:
     """The mean angular velocity of a settled ball, rad/s."""
-    with tempfile.TemporaryDirectory() as place:
-        run = Path(place) / "run.h5"
-        asked = ["--engine", engine, "--omega-0", str(flow), "--time", str(DURATION)]
-        command = [sys.executable, "-m", "compare", "simulate", *asked, "-o", str(run)]
-        subprocess.run(command, check=True, capture_output=True)
-        kept = storage.load(run)
-    return float(np.mean(kept.omega_c[kept.time > 0.75 * DURATION]))
+    p = Parameters.named("reference").replace(omega_0=flow)
+    run = carry_out(Task(engine=engine, parameters=p, x0=State(), t_end=DURATION))
+    return float(np.mean(run.omega_c[run.time > 0.75 * DURATION]))
 
 
 def draw(readings: Mapping[str, Sequence[float]]) -> Figure:
