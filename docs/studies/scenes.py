@@ -82,63 +82,55 @@ Kept = Mapping[str, Mapping[str, Any]]
 Rows = list[list[str]]
 
 
+def there(kept: Kept) -> list[tuple[str, str, Any]]:
+    """Titles of the scenes that are kept, the versions that each ran with, and its ways."""
+    return [
+        (scene.title, kept[name]["versions"], kept[name]["ways"])
+        for name, scene in SCENES.items()
+        if name in kept
+    ]
+
+
 def figures(kept: Kept) -> Rows:
     """Creep, slip and what else is measured of a scene, and what went wrong."""
     rows = [["", *WAYS]]
-    for name, scene in SCENES.items():
-        ways = kept[name]["ways"] if name in kept else {}
-        for quantity in ways.get("plain", {"values": {}})["values"]:
+    for title, _, ways in there(kept):
+        for quantity in ways["plain"]["values"]:
             cells = [
                 ": ".join([f"{ways[way]['values'][quantity]:.1e}", *ways[way]["wrong"]])
                 if way in ways
                 else "–"
                 for way in WAYS
             ]
-            rows.append([f"{scene.title}: {quantity}", *cells])
+            rows.append([f"{title}: {quantity}", *cells])
     return rows
 
 
 def cost(kept: Kept) -> Rows:
     """Processor time of a step in units of plain MuJoCo's."""
-    timed = [name for name, way in WAYS.items() if way.timed]
-    rows = [["", "with", "contacts", "plain, µs", *timed[1:]]]
-    for name, scene in SCENES.items():
-        if name in kept:
-            ways = kept[name]["ways"]
-            plain = ways["plain"]["step"]
-            cells = [
-                f"{ways[way]['step'] / plain:.2f}" if way in ways else "–" for way in timed[1:]
-            ]
-            rows.append(
-                [
-                    scene.title,
-                    kept[name]["versions"],
-                    f"{ways['plain']['contacts']}",
-                    f"{plain * 1e6:.0f}",
-                    *cells,
-                ]
-            )
+    timed = [name for name, way in WAYS.items() if way.timed and name != "plain"]
+    rows = [["", "with", "contacts", "plain, µs", *timed]]
+    for title, versions, ways in there(kept):
+        plain = ways["plain"]["step"]
+        cells = [f"{ways[way]['step'] / plain:.2f}" if way in ways else "–" for way in timed]
+        contacts = str(ways["plain"]["contacts"])
+        rows.append([title, versions, contacts, f"{plain * 1e6:.0f}", *cells])
     return rows
 
 
 def worse(kept: Kept) -> Rows:
     """Where bodies sink in deeper, or energy rises higher, than in plain MuJoCo."""
     rows = [["", "", "plain", *NEW]]
-    for name, scene in SCENES.items():
-        ways = kept[name]["ways"] if name in kept else {}
+    for title, _, ways in there(kept):
         for quantity, label in (("depth", "depth, m"), ("rise", "rise of energy, J")):
-            values = [ways[way][quantity] if way in ways else None for way in ("plain", *NEW)]
-            plain, *others = values
+            plain, *others = (
+                ways[way][quantity] if way in ways else None for way in ("plain", *NEW)
+            )
             if plain is not None and any(
                 other is not None and other > WORSE * plain + 1e-9 for other in others
             ):
-                rows.append(
-                    [
-                        scene.title,
-                        label,
-                        *("–" if each is None else f"{each:.1e}" for each in values),
-                    ]
-                )
+                cells = ("–" if each is None else f"{each:.1e}" for each in (plain, *others))
+                rows.append([title, label, *cells])
     return rows
 
 
