@@ -40,19 +40,11 @@ def absent(package: str) -> str:
 def current_commit() -> str:
     """The git commit of the checkout the program runs from, ``+`` for local changes, or empty."""
     # Without locks: git leaves them in the checkout if it takes too long and is killed.
-    git = [
-        "git",
-        "--no-optional-locks",
-        "describe",
-        "--always",
-        "--dirty=+",
-        "--abbrev=40",
-        "--exclude=*",
-    ]
+    git = "git --no-optional-locks describe --always --dirty=+ --abbrev=40 --exclude=*"
     here = Path(__file__).resolve().parent
     try:
         return subprocess.check_output(
-            git, cwd=here, stderr=subprocess.DEVNULL, text=True, timeout=10
+            git.split(), cwd=here, stderr=subprocess.DEVNULL, text=True, timeout=10
         ).strip()
     except (OSError, subprocess.SubprocessError):
         return ""

@@ -88,6 +88,12 @@ class Ball(NamedTuple):
     """0, or by how much the velocities of a step that did not converge still changed, m s-1."""
 
 
+def _in_parts(ball: Ball) -> Any:
+    """The ball in plain tuples: a signal would be answered while numba makes named ones, which
+    doesn't look whether it has got them."""
+    return (ball.at[:3], ball.at.u[:]), ball.P[:], ball.impact[:], ball[3:]
+
+
 def ball_from_parts(parts: Any) -> Ball:
     """The ball from the plain tuples that `follow` returns."""
     (place, u), P, impact, rest = parts
@@ -500,33 +506,21 @@ def follow(
     """Follow a run for at most so many steps, or to its end, where it doesn't converge, or is over:
     ball and place.
 
-    They are in parts, plain tuples (`ball_from_parts`): a signal would be answered while numba
-    makes named ones, which doesn't look whether it has got them. Samples beyond the end of a run
-    that has been quiet for long repeat its last state; the place is then behind the last stretch,
-    as at any end."""
+    The ball is in parts (`ball_from_parts`). Samples beyond the end of a run that has been quiet
+    for long repeat its last state; the place is then behind the last stretch, as at any end."""
     (starts, dts, counts, sampled, flow), (s, k, now, landed) = stretches, place
     while s < len(starts):
         start, dt = starts[s], dts[s]
         while k < counts[s]:
             if most == 0 or run.over[0]:
-                return ((ball.at[:3], ball.at.u[:]), ball.P[:], ball.impact[:], ball[3:]), (
-                    s,
-                    k,
-                    now,
-                    landed,
-                )
+                return _in_parts(ball), (s, k, now, landed)
             most -= 1
             case, known = ball.case, ball.landings
             ball = step(ball, dt, _flow_at(flow, start + (k + 0.5) * dt), p)
             k += 1
             now = start + k * dt
             if ball.residual != 0:
-                return ((ball.at[:3], ball.at.u[:]), ball.P[:], ball.impact[:], ball[3:]), (
-                    s,
-                    k,
-                    now,
-                    landed,
-                )
+                return _in_parts(ball), (s, k, now, landed)
             if ball.landings > known:
                 run.landings[run.taken[0]] += ball.landings - known
                 landed = now
@@ -546,4 +540,4 @@ def follow(
                 run.case[last + 1 :] = run.case[last]
                 s = len(starts)
         s, k = s + 1, 0
-    return ((ball.at[:3], ball.at.u[:]), ball.P[:], ball.impact[:], ball[3:]), (s, k, now, landed)
+    return _in_parts(ball), (s, k, now, landed)
