@@ -306,7 +306,7 @@ SLIDING: dict[str, Callable[[float, dict[str, Any]], str]] = {
     "ball that slides, then rolls with 5/7 v: relative error": (
         lambda step, way: f"{rolling(step, way):+.1e}"
     ),
-    "disc that rolls round on its rim at 20° (Euler's): energy after 2 s, change": (
+    "Euler's disc at 20°: energy gained in 2 s": (
         lambda step, way: f"{precessing(step, way)[0]:+.1e}"
     ),
 }
