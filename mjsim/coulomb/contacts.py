@@ -264,10 +264,15 @@ def square_apart(one: Any, other: Any) -> float:
     """Square of how far apart two contacts are on their bodies, m2; infinite for other geoms."""
     if not same_geoms(one.geoms, other.geoms):
         return math.inf
+    return float(square_way(one, other, 0) + square_way(one, other, 1))
+
+
+@kernel
+def square_way(one: Any, other: Any, side: int) -> float:
+    """Square of how far apart two contacts are on one of their bodies, m2."""
     square = 0.0
-    for side in range(2):
-        for axis in range(3):
-            square += (one.place[side, axis] - other.place[side, axis]) ** 2
+    for axis in range(3):
+        square += (one.place[side, axis] - other.place[side, axis]) ** 2
     return square
 
 
@@ -344,9 +349,11 @@ def inherit(model: Any, data: Any, memory: Any, contact: Any, old: Any) -> None:
     alone, spins = contact.state == NEW, (spin(model, data, old, 0), spin(model, data, old, 1))
     both = spins[0] + spins[1]
     contact.bias = old.bias if alone else 0.0
-    known = is_fixed(model, memory, old, max(spins)) or rolls(model, memory, contact, old)
+    known = alone and (
+        is_fixed(model, memory, old, max(spins)) or rolls(model, memory, contact, old)
+    )
     for axis in range(3):  # one that wanders over its bodies, or is made of several, has none
-        contact.velocity[axis] = old.velocity[axis] if alone and known else math.inf
+        contact.velocity[axis] = old.velocity[axis] if known else math.inf
     contact.state = max(contact.state, old.state)
     contact.error, contact.lift = max(contact.error, old.error), max(contact.lift, old.lift)
     contact.load += old.load
@@ -381,19 +388,11 @@ def is_fixed(model: Any, memory: Any, old: Any, turning: float) -> bool:
 @kernel
 def rolls(model: Any, memory: Any, contact: Any, old: Any) -> bool:
     """Whether a rigid contact has rolled: as far over one of its bodies as over the other."""
-    one, other = way(contact, old, 0), way(contact, old, 1)
-    farthest = FARTHEST * smaller_radius(model, old)
-    alike = abs(one - other) <= ALIKE * max(one, other) and max(one, other) <= farthest
-    return bool(memory.law.rigid and old.state == STICKS and alike)
-
-
-@kernel
-def way(contact: Any, old: Any, side: int) -> float:
-    """How far a contact has come over a body since it was the old one, m."""
-    square = 0.0
-    for axis in range(3):
-        square += (contact.place[side, axis] - old.place[side, axis]) ** 2
-    return math.sqrt(square)
+    if not memory.law.rigid or old.state != STICKS:
+        return False
+    one, other = math.sqrt(square_way(contact, old, 0)), math.sqrt(square_way(contact, old, 1))
+    alike = abs(one - other) <= ALIKE * max(one, other)
+    return bool(alike and max(one, other) <= FARTHEST * smaller_radius(model, old))
 
 
 @kernel

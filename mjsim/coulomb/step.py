@@ -204,7 +204,7 @@ def hand_on(model: Any, data: Any, memory: Any, known: bool, over: bool) -> None
 
 @kernel
 def store(model: Any, data: Any, memory: Any, over: bool) -> None:
-    """Store forces in the axes of bodies, and how contacts slip."""
+    """Store forces in the axes of bodies, and how contacts part and slip."""
     store_forces(memory, over)
     store_velocities(model, data, memory)
 
