@@ -202,8 +202,8 @@ def pictures(
     new.reverse()  # the last ones take longest
     for (path, *_), found in zip(new, spread(drawn, new), strict=True):
         figures[path.stem] |= found
-    drawings_there = {name: of["picture"] for name, of in figures.items() if not of["gap"]}
-    made, letters = embedded(drawings_there)
+    whole = {name: of["picture"] for name, of in figures.items() if not of["gap"]}
+    made, letters = embedded(whole)
     for name, picture in made.items():
         figures[name]["picture"] = picture
     return figures, letters

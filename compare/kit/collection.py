@@ -219,7 +219,10 @@ def _means(runs: Mapping[str, Trajectory]) -> Columns:
 
 def _digest(*parts: bytes) -> str:
     """A hash of bytes, 32 hexadecimal digits."""
-    return hashlib.sha256(b"".join(parts)).hexdigest()[:32]
+    digest = hashlib.sha256()
+    for part in parts:  # joined they would take the memory of a run once more
+        digest.update(part)
+    return digest.hexdigest()[:32]
 
 
 def _attributes() -> dict[str, dict[str, Any]]:

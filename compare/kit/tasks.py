@@ -128,7 +128,7 @@ def store(
     path: Path,
     limit: float = math.inf,
     stop: Callable[[], bool] = lambda: False,
-    tell: Callable[[float], object] = float,
+    tell: Callable[[float], object] = lambda done: None,
 ) -> str:
     """Carry out one task into a file of its own; return why the run is not whole, or nothing.
 

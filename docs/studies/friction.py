@@ -285,42 +285,48 @@ def precessing(
     return energies[1] / energies[0] - 1, now - leans
 
 
-def rolling(step: float, way: dict[str, Any]) -> float:
+def rolling(step: float, way: dict[str, Any]) -> tuple[float]:
     """A ball that slides, then rolls: relative error of its speed, 5/7 of that it begins with."""
     data, stepper = start(one(BALL, 0.3, step=step), **way)
     stepper.step(data, round(1 / step))
     data.qvel[0] = 1.0
     stepper.step(data, round(1 / step))
-    return float(data.qvel[0] * 7 / 5 - 1)
+    return (float(data.qvel[0] * 7 / 5 - 1),)
 
 
-SLIDING: dict[str, Callable[[float, dict[str, Any]], str]] = {
-    "box that slides down 20°, μ 0.25: relative error of its acceleration": (
-        lambda step, way: f"{slide_down(step, way)[0]:.1e}"
-    ),
-    "its contact is lost in": lambda step, way: f"{slide_down(step, way)[1]:.0%}",
-    "box pushed off with 2 m/s, μ 0.4: its height varies by, µm": (
-        lambda step, way: f"{1e6 * pushed_off(step, way)[0]:.2g}"
-    ),
-    "relative error of its way, v²/(2 μ g)": lambda step, way: f"{pushed_off(step, way)[1]:+.1e}",
-    "ball that slides, then rolls with 5/7 v: relative error": (
-        lambda step, way: f"{rolling(step, way):+.1e}"
-    ),
-    "Euler's disc at 20°: energy gained in 2 s": (
-        lambda step, way: f"{precessing(step, way)[0]:+.1e}"
-    ),
+Shown = dict[str, Callable[..., str]]
+"""What is told of a motion, from all that is measured of it."""
+SLIDING: dict[Callable[[float, dict[str, Any]], tuple[float, ...]], Shown] = {
+    slide_down: {
+        "box that slides down 20°, μ 0.25: relative error of its acceleration": (
+            lambda error, lost: f"{error:.1e}"
+        ),
+        "its contact is lost in": lambda error, lost: f"{lost:.0%}",
+    },
+    pushed_off: {
+        "box pushed off with 2 m/s, μ 0.4: its height varies by, µm": (
+            lambda height, error: f"{1e6 * height:.2g}"
+        ),
+        "relative error of its way, v²/(2 μ g)": lambda height, error: f"{error:+.1e}",
+    },
+    rolling: {
+        "ball that slides, then rolls with 5/7 v: relative error": lambda error: f"{error:+.1e}"
+    },
+    precessing: {
+        "Euler's disc at 20°: energy gained in 2 s": lambda gained, leans: f"{gained:+.1e}"
+    },
 }
-"""What is told of motions that have a closed form, at a time step and in a way."""
+"""Motions that have a closed form, by what measures them at a time step and in a way."""
 
 
 def sliding() -> Rows:
     """Motions that slide or roll, with their closed forms."""
-    ways = {"plain": PLAIN, "soft": SOFT, "rigid": RIGID}
-    rows = [
-        [name, f"{1e3 * step:g}", *(told(step, way) for way in ways.values())]
-        for name, told in SLIDING.items()
-        for step in (2e-3, 1e-3)
-    ]
+    ways, rows = {"plain": PLAIN, "soft": SOFT, "rigid": RIGID}, list[list[str]]()
+    for measure, told in SLIDING.items():
+        found = {step: [measure(step, way) for way in ways.values()] for step in (2e-3, 1e-3)}
+        for name, show in told.items():
+            for step, values in found.items():
+                rows.append([name, f"{1e3 * step:g}", *(show(*each) for each in values)])
     return [["", "step, ms", *ways], *rows]
 
 
