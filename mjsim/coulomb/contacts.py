@@ -41,7 +41,7 @@ from .memory import (
     pairs_at,
     rows_of,
 )
-from .parameters import ALIKE, AT_MOST, CORNER, FARTHEST, FLUSH, STILL, UNMOVED
+from .parameters import ALIKE, APART, AT_MOST, CORNER, FARTHEST, FLUSH, STILL, UNMOVED
 
 SIZE = MJ_CONTACT.itemsize
 WORDS = SIZE // 8
@@ -116,11 +116,15 @@ def nothing_moved(model: Any, data: Any, memory: Any) -> bool:
 
 @kernel
 def read_gaps(data: Any, memory: Any) -> None:
-    """Read the gaps of contacts that haven't moved otherwise."""
+    """Read the gaps of contacts that haven't moved otherwise; those left out still are."""
     contacts, found = contacts_of(memory), engine_contacts(data.contact, data.ncon)
     for i in range(memory.contacts):
         given = found[contacts[i].index]
         contacts[i].gap, contacts[i].margin = given.dist, given.includemargin
+    poses = engine_contacts(memory.pose_at, data.ncon)
+    for i in range(data.ncon):
+        if poses[i].exclude and found[i].efc_address >= 0:
+            leave_out(data, found[i])
 
 
 # -- found -----------------------------------------------------------------------------------------
@@ -148,7 +152,7 @@ def find(model: Any, data: Any, memory: Any) -> None:
     count = 0
     for i in range(data.ncon):
         given, address = found[i], found[i].efc_address
-        if address < 0 or given.geom[0] < 0 or given.geom[1] < 0:
+        if address < 0 or given.exclude or given.geom[0] < 0 or given.geom[1] < 0:
             continue
         if not memory.law.rigid and (given.dim == 1 or damping[address + 1, 1] <= 0):
             continue
@@ -214,25 +218,28 @@ def copy_jacobians(model: Any, data: Any, memory: Any) -> None:
     jacobian, column = reals(memory.jacobian_at, size), integers(memory.column_at, size)
     while u < len(rows):
         dim, length = rows[u].dim, lengths[u] if sparse else model.nv
-        begin = begins[u] if sparse else u * length
-        for r in range(dim):
-            rows[u + r].first = total
-            for n in range(begin, begin + length):
-                if moves(given, n, dim, length):
-                    jacobian[total] = given[n + r * length]
-                    column[total] = columns[n] if sparse else n - begin
-                    total += 1
-            rows[u + r].length = total - rows[u + r].first
-        u += dim
+        begin, first = begins[u] if sparse else u * length, total
+        for n in range(begin, begin + length):
+            if moves(given, n, dim, length):
+                column[total] = n
+                total += 1
+        count = total - first
+        for r in range(dim - 1, -1, -1):  # the first row, whose columns say where, is the last
+            rows[u + r].first, rows[u + r].length = first + r * count, count
+            for k in range(count):
+                n, at = column[first + k], first + r * count + k
+                jacobian[at] = given[n + r * length]
+                column[at] = columns[n] if sparse else n - begin
+        u, total = u + dim, first + dim * count
 
 
 @kernel
 def moves(given: Any, n: int, dim: int, length: int) -> bool:
     """Whether one of `dim` rows, each of this length, moves the column of number n."""
-    some = False
+    size = 0.0
     for r in range(dim):
-        some = some or given[n + r * length] != 0
-    return some
+        size += abs(given[n + r * length])
+    return size > 0
 
 
 @kernel
@@ -454,7 +461,7 @@ def leave_added_points_out(model: Any, data: Any, memory: Any) -> bool:
     """Leave out points that the collider adds to a patch whose points are all where they were.
 
     They are deeper than the bodies can have come in a step: their springs would throw these apart.
-    Returns whether there were any: the constraint rows are then made anew.
+    Returns whether there were any.
     """
     contacts, found = contacts_of(memory), engine_contacts(data.contact, data.ncon)
     before, left_out = contacts_at(memory.before_at, memory.contacts_before), False
@@ -469,10 +476,16 @@ def leave_added_points_out(model: Any, data: Any, memory: Any) -> bool:
             if same_geoms(before[k].geoms, new.geoms):
                 had, kept = had + 1, kept and before[k].moved < UNMOVED**2
         if kept and had > 2:
-            found[new.index].exclude, found[new.index].efc_address, left_out = 1, -1, True
-    if left_out:
-        make_rows_anew(memory)
+            leave_out(data, found[new.index])
+            left_out = True
     return left_out
+
+
+@kernel
+def leave_out(data: Any, given: Any) -> None:
+    """Let a contact of mjData bear nothing: it allows any approach."""
+    given.exclude = 1
+    reals(data.efc_aref, data.nefc)[given.efc_address] = -APART
 
 
 @kernel
