@@ -123,7 +123,7 @@ def _steps(
                 t, now = start + tau, between(tau)
             due = slice(taken, int(np.searchsorted(times, t, side="right")))
             if due.stop > taken:
-                samples[due], taken = between(times[due] - start).T, due.stop
+                samples[due, : len(z)], taken = between(times[due] - start).T, due.stop
         z[:] = now
         yield t, guard, taken
         if guard >= 0:

@@ -7,20 +7,13 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
-from analytic.simulation.motion import HybridState
-from analytic.simulation.settings import (
-    ENDLESS,
-    LANDED,
-    Settings,
-    check_duration,
-    sample_times,
-    start_state,
-)
+from analytic.simulation.motion import Recorder, Rows
+from analytic.simulation.settings import Settings, check_duration, sample_times, start_state
+from analytic.simulation.simulator import simulator
 from model import Flow, InputError, Parameters, State
 from model.arrays import Array
 from model.errors import check_type
@@ -101,100 +94,34 @@ def simulate_many(
         threads = os.cpu_count() or 1
     workers = int(check_number("threads", threads, "threads", Range(1, MOST_THREADS, whole=True)))
 
-    over, shape, t_end = np.zeros(1, bool), (count, len(times)), float(times[-1])
-    x = np.full((*shape, 8), np.nan)
-    case = np.full(shape, -1, np.int8)
-    landings = np.zeros(shape, np.int64)
-    x[:, 0], end, failure = states, np.zeros(count), [""] * count
-    carry_out = _run_time_stepping if settings.method == "time-stepping" else _run_event_driven
-
     steady = {p: Flow.steady(p.omega_0) for p in dict.fromkeys(sets)}
     fluids = [flow or steady[p] for p, flow in zip(sets, flows, strict=True)]
     for p, fluid, start in zip(sets, fluids, states, strict=True):
-        check_duration(p, fluid, t_end, start)
-    todo = iter(range(count))
+        check_duration(p, fluid, float(times[-1]), start)
+    shape, over, by = (count, len(times)), np.zeros(1, bool), simulator(settings)
+    x, case = np.full((*shape, 8), np.nan), np.full(shape, -1, np.int8)
+    landings = np.zeros(shape, np.int64)
 
-    def work() -> None:
-        """In a thread: carry out one run after the other of those that no thread has begun."""
+    def carry_out(n: int) -> tuple[float, str]:
+        """In a thread: a run, into its rows; when it ended, and why it failed, if it did."""
+        run = Rows.filling(times, x[n], case[n], landings[n], still, over)
         try:
-            for n in todo:
-                if over[0]:
-                    return
-                run = _Run(
-                    sets[n],
-                    states[n],
-                    fluids[n],
-                    settings,
-                    times,
-                    still,
-                    x[n],
-                    case[n],
-                    landings[n],
-                    over,
-                )
-                end[n], failure[n] = carry_out(run)
+            by.carry_out(states[n], 0.0, sets[n], fluids[n], settings, Recorder(run))
+        except (ArithmeticError, InterruptedError) as error:
+            return float(run.reached[0]), f"stopped at t = {run.reached[0]:g} s: {error}"
         except BaseException:
             over[0] = True  # nobody wants the others any more
             raise
+        last = run.taken[0] - 1
+        run.x[last:], run.case[last:] = run.x[last], run.case[last]
+        return float(times[last]), ""
 
-    with ThreadPoolExecutor(workers) as pool:
+    with ThreadPoolExecutor(min(workers, count)) as pool:
         try:
-            for each in [pool.submit(work) for _ in range(min(workers, count))]:
-                each.result()
+            end, failure = zip(*pool.map(carry_out, range(count)), strict=True)
         finally:
             over[0] = True
-    return Ensemble(times, x, case, landings, end, tuple(failure))
-
-
-@dataclass(frozen=True, eq=False)
-class _Run:
-    """A run of many, and its rows."""
-
-    p: Parameters
-    x0: State
-    flow: Flow
-    settings: Settings
-    times: Array
-    quiet: float
-    x: Array
-    case: npt.NDArray[np.int8]
-    landings: npt.NDArray[np.int64]
-    over: npt.NDArray[np.bool_]
-    """Whether nobody wants it any more."""
-
-
-def _run_time_stepping(run: _Run) -> tuple[float, str]:
-    """A run by time stepping, into its rows; when it ended, and why it failed, if it did."""
-    # here, since numba takes a while to load
-    from analytic.simulation import stepping, time_stepping
-
-    ball, stretches, given = time_stepping.prepared(
-        run.x0, 0.0, run.p, run.flow, run.settings, run.times
-    )
-    none, taken = np.empty((0, 9)), np.array([1, 0])
-    rows = stepping.Rows(run.x, run.case, run.landings, none, none, taken, run.quiet, run.over)
-    parts, (_, _, now, _) = stepping.follow(ball, (0, 0, 0.0, 0.0), stretches, given, rows, ENDLESS)
-    if stepping.ball_from_parts(parts).residual == 0:
-        return now, ""
-    return now, f"stopped at t = {now:g} s: the velocities don't settle; a shorter step may help"
-
-
-def _run_event_driven(run: _Run) -> tuple[float, str]:
-    """A run by event-driven simulation, into its rows; when it ended, and why it failed, if it
-    did."""
-    from analytic.simulation import hybrid  # here, since scipy and numba take a while to load
-
-    impact = LANDED * run.p.m * math.sqrt(run.p.g * run.p.R) * (1 + run.settings.restitution)
-    each = run.times, run.x, run.case, run.landings, hybrid.Stop(impact, run.quiet, run.over)
-    given = hybrid.prepare(run.p, run.flow, run.settings, float(run.times[-1]))
-    rows, failure = hybrid.carry_out(
-        HybridState(0.0, 0.0, run.x0), *given, partial(hybrid.Record.of, *each, whole=False)
-    )
-    last = int(rows.taken[0]) - 1
-    if failure:
-        return float(run.times[max(last, 0)]), f"stopped at t = {rows.reached[0]:g} s: {failure}"
-    run.x[last:], run.case[last:] = run.x[last], run.case[last]
-    return float(run.times[last]), ""
+    return Ensemble(times, x, case, landings, np.array(end), failure)
 
 
 def random_starts(p: Parameters, count: int, seed: int = 0) -> Array:

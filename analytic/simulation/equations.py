@@ -98,28 +98,7 @@ class System(NamedTuple):
 
 def in_case(k: System, case: int, side: float, line: Line, fall: Fall) -> System:
     """The system in another case, with its side, line of the flow and known fall."""
-    return System(
-        k.m,
-        k.r,
-        k.R,
-        k.j,
-        k.mu,
-        k.eta,
-        k.g,
-        k.c,
-        k.law,
-        k.stokes,
-        k.rtol,
-        k.restitution,
-        k.leaves,
-        k.unit,
-        k.spin,
-        k.waves,
-        line,
-        case,
-        side,
-        fall,
-    )
+    return System(*k[:-4], line, case, side, fall)
 
 
 def fluid(t: float, k: System) -> float:
@@ -331,8 +310,10 @@ def _horizontal_drag(t: float, z: Any, rise: float, k: System) -> tuple[complex,
 def _rates_away(t: float, z: Any, k: System, out: Any) -> None:
     """`rates` of a ball away from the wall."""
     rise = 0.0
-    if k.case == NN:
-        rise = fall_speed(t, k) if k.fall.landing < math.inf else z[5]
+    if k.case == NN and k.fall.landing < math.inf:
+        rise = drag.fall_speed(t - k.fall.since, k.fall.v_y, k)
+    elif k.case == NN:
+        rise = z[5]
     V, lag, c = _horizontal_drag(t, z, rise, k)
     power, push, last = -k.m * c * ((lag * V.conjugate()).real + rise * rise), -c * lag, 4
     if k.case == RN:
@@ -363,14 +344,6 @@ def _guards_away(t: float, z: Any, k: System, out: Any) -> None:
         out[0] = gap
         if k.fall.landing == math.inf:
             out[1] = z[4] / k.R
-
-
-def fall_speed(t: float, k: System) -> float:
-    """v_y of a free flight with Stokes' drag at a time, m s-1, as `drag.fall_speed`."""
-    since, v_y, _ = k.fall
-    return v_y - (k.c * v_y + k.g) * (
-        math.expm1(-k.c * (t - since)) / -k.c if k.c > 0 else t - since
-    )
 
 
 def smooth_rates(u: Velocities, h: float, t: float, k: System) -> Velocities:

@@ -16,8 +16,6 @@ from model.kinematics import check_place
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_choice, check_number
 
 MAX_SAMPLES = 5e7
-ENDLESS = 2**62
-"""As many steps as there are."""
 LANDED = 1e-3
 """Speed relative to sqrt(g R) from which a landing counts: less is settling, or round-off."""
 HUGE, MAX_RADIANS = 1e3, 1e5

@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
+from importlib import import_module
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -65,11 +67,6 @@ def simulate(
     check_type("settings", settings, Settings | None)
     check_names(changes, [field.name for field in dataclasses.fields(Settings)], "setting")
     settings = dataclasses.replace(settings or Settings(), **changes)
-    if settings.method == "event":
-        # here, because the integrators of scipy take half a second to load
-        from analytic.simulation.hybrid import run
-    else:
-        from analytic.simulation.time_stepping import run
     flow = Flow.steady(p.omega_0) if flow is None else flow
     x = start_state(x0, p, settings)
     times = sample_times(t_end, sample_interval)
@@ -81,16 +78,22 @@ def simulate(
         | start
         | {"t_end": float(times[-1]), "sample_interval": second - first}
     )
-    recorder = Recorder(p, times, progress)
+    recorder, by = Recorder.whole(times, progress), simulator(settings)
     header = Header(settings.method, p, flow, shown)
     try:
-        run(x, theta_0, p, flow, settings, recorder)
+        by.carry_out(x, theta_0, p, flow, settings, recorder)
     except (ArithmeticError, InterruptedError) as error:
-        failure = f"stopped at t = {recorder.time:g} s: {error}"
-        raise SimulationError(
-            failure, recorder.trajectory(dataclasses.replace(header, failure=failure))
-        ) from error
-    return recorder.trajectory(header)
+        failure = f"stopped at t = {recorder.rows.reached[0]:g} s: {error}"
+        header = dataclasses.replace(header, failure=failure)
+        raise SimulationError(failure, recorder.trajectory(header, by.sample_forces)) from error
+    return recorder.trajectory(header, by.sample_forces)
+
+
+def simulator(settings: Settings) -> ModuleType:
+    """The module of the method, with `carry_out` and `sample_forces`."""
+    # here, because the integrators of scipy take half a second to load, and numba a while
+    name = "hybrid" if settings.method == "event" else "time_stepping"
+    return import_module(f"analytic.simulation.{name}")
 
 
 def slip_perturbation(p: Parameters, slip: float, beta: float, t_end: float) -> Trajectory:

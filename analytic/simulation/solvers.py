@@ -61,16 +61,11 @@ class Stretch(NamedTuple):
     times: Array
     """Of all samples of the run, s, shape (m,)."""
     samples: Array
-    """Coordinates then (m, n)."""
+    """Coordinates then, in the first columns (m, MOST)."""
     arm: Array
     """Above which values guards are armed, and at which they fire (guards,), as
     `coordinates.arm_guards` says."""
     level: Array
-
-
-def _copy(given: Array, out: Array) -> None:
-    for i in range(len(out)):
-        out[i] = given[i]
 
 
 def _interpolate(x: float, z: Array, F: Array, out: Array) -> None:
@@ -305,11 +300,11 @@ def explicit_steps(
                 taken += 1
             if fired >= 0:
                 _interpolate(share, z, F, now)
-                _copy(now, z)
+                z[:] = now
                 return FIRED, until, h, fired, taken
-        _copy(new, z)
-        _copy(K[STAGES], K[0])
-        _copy(seen[LOOKS_A_STEP], seen[0])
+        z[:] = new
+        K[0] = K[STAGES]
+        seen[0] = seen[LOOKS_A_STEP]
         tau = after
         grow = GROW if error == 0 else min(GROW, SAFETY * error**-0.125)
         h *= min(grow, 1.0) if rejected else grow
@@ -374,7 +369,7 @@ def _extrapolation_step(
             for c in range(n):
                 M[i, c] = (i == c) - part * J[i, c]
         _lu_factor(M, order)
-        _copy(z, y)
+        y[:] = z
         for s in range(steps):
             equations.rates(t + (s + 1) * part, y, k, rate)
             for i in range(n):
@@ -414,7 +409,7 @@ def implicit_steps(
             return DONE, tau, h, -1, taken
         equations.rates(start + tau, z, k, here)
         for c in range(n):
-            _copy(z, now)
+            now[:] = z
             now[c] += math.sqrt(EPS) * max(
                 abs(z[c]), scale[c] * (k.rtol if c in range(first, end, 2) else 1.0)
             )
@@ -433,7 +428,7 @@ def implicit_steps(
                 break
             h = length / 4
         after = stop if length == stop - tau else tau + length
-        _copy(table[0], now)
+        now[:] = table[0]
         equations.guards(start + after, now, k, values)
         fired = -1
         for guard in range(len(arm)):
@@ -452,15 +447,15 @@ def implicit_steps(
                     fell = guard if values[guard] < level[guard] else fell
                 if fell >= 0:
                     high, fired = middle, fell
-                    _copy(table[0], now)
+                    now[:] = table[0]
                 else:
                     low = middle
-            _copy(now, z)
+            z[:] = now
             return FIRED, tau + high, h, fired, taken
-        _copy(now, z)
+        z[:] = now
         tau = after
         while taken < len(times) and _is_past(times[taken], start, tau):
-            _copy(z, samples[taken])
+            samples[taken, :n] = z
             taken += 1
         if length == h or error < 0.01:
             h = length * min(

@@ -13,6 +13,7 @@ from analytic.mechanics.contact_problem import Friction, Impulse, project, solve
 from analytic.mechanics.rigid_body import NOTHING, Forces, Velocities, mean
 from analytic.simulation import compiling
 from analytic.simulation.equations import AWAY, ROLLS, SLIPS
+from analytic.simulation.motion import Rows, count_landings, keep_event, keep_sample
 from analytic.simulation.settings import LANDED
 from model.arrays import Array
 
@@ -100,8 +101,8 @@ def ball_from_parts(parts: Any) -> Ball:
     return Ball(BallState._make([*place, Velocities(*u)]), Forces(*P), Forces(*impact), *rest)
 
 
-Progress = tuple[int, int, float, float]
-"""How far a run is: stretch, steps taken of it, time, and time of the last landing, s."""
+Progress = tuple[int, int]
+"""How far a run is: stretch, and steps taken of it."""
 
 
 class Touching(NamedTuple):
@@ -123,26 +124,6 @@ class Stretches(NamedTuple):
     sampled: npt.NDArray[np.bool_]
     """Whether the end is a sample."""
     flow: FlowArrays
-
-
-class Rows(NamedTuple):
-    """Arrays with what is kept of a run, a row a sample or event."""
-
-    x: Array
-    """States (n, 8)."""
-    case: npt.NDArray[np.int8]
-    landings: npt.NDArray[np.int64]
-    """Landings since the sample before (n,)."""
-    path: Array
-    """Time, azimuth, work, and contact forces (n, 9); none where nobody wants them."""
-    events: Array
-    """Times, cases before and after, impulses of landings (m, 9); none where nobody wants them."""
-    taken: npt.NDArray[np.int64]
-    """How many samples are kept, and how many events, shape (2,)."""
-    quiet: float
-    """For how long nothing must land for the run to be stopped, s."""
-    over: npt.NDArray[np.bool_]
-    """Whether nobody wants it any more, shape (1,)."""
 
 
 class StepSolution(NamedTuple):
@@ -485,18 +466,14 @@ def _flow_at(flow: FlowArrays, time: float) -> float:
     return float(omega_0)
 
 
-def keep_sample(ball: Ball, P: Forces, dt: float, time: float, p: Constants, run: Rows) -> None:
+def _keep_sample(ball: Ball, P: Forces, dt: float, p: Constants, run: Rows) -> None:
     """Store a ball after a step of length dt with impulses P as the next sample."""
-    row = run.taken[0]
-    state = rigid_body.state(ball.at.y, ball.at.h, ball.at.u, p)
-    for i in range(8):
-        run.x[row, i] = state[i]
-    run.case[row] = ball.case
+    row = keep_sample(rigid_body.state(ball.at.y, ball.at.h, ball.at.u, p), ball.case, run)
     if len(run.path) > 0:
-        run.path[row, 0], run.path[row, 1], run.path[row, 2] = time, ball.at.theta, ball.work
+        path = run.path[row]
+        path[0], path[1] = ball.at.theta, ball.work
         for i in range(6):
-            run.path[row, 3 + i] = P[i] / dt
-    run.taken[0] += 1
+            path[2 + i] = P[i] / dt
 
 
 @compiling.compiled
@@ -506,38 +483,35 @@ def follow(
     """Follow a run for at most so many steps, or to its end, where it doesn't converge, or is over:
     ball and place.
 
-    The ball is in parts (`ball_from_parts`). Samples beyond the end of a run that has been quiet
-    for long repeat its last state; the place is then behind the last stretch, as at any end."""
-    (starts, dts, counts, sampled, flow), (s, k, now, landed) = stretches, place
+    The ball is in parts (`ball_from_parts`). The first sample, before any step, carries the forces
+    and the case of the first step. A run that has been quiet for long ends at that sample; the
+    place is then behind the last stretch, as at any end."""
+    (starts, dts, counts, sampled, flow), (s, k) = stretches, place
+    if run.taken[0] == 0:
+        dt = dts[0]
+        first = step(ball, dt, _flow_at(flow, starts[0] + 0.5 * dt), p)
+        ball = Ball(ball.at, ball.P, ball.impact, first.case, 0.0, 0, 0.0)
+        _keep_sample(ball, first.P, dt, p, run)
     while s < len(starts):
         start, dt = starts[s], dts[s]
         while k < counts[s]:
             if most == 0 or run.over[0]:
-                return _in_parts(ball), (s, k, now, landed)
+                return _in_parts(ball), (s, k)
             most -= 1
             case, known = ball.case, ball.landings
             ball = step(ball, dt, _flow_at(flow, start + (k + 0.5) * dt), p)
             k += 1
             now = start + k * dt
+            run.reached[0] = now
             if ball.residual != 0:
-                return _in_parts(ball), (s, k, now, landed)
+                return _in_parts(ball), (s, k)
             if ball.landings > known:
-                run.landings[run.taken[0]] += ball.landings - known
-                landed = now
-            if len(run.events) > 0 and (
-                ball.case != case or ball.impact.A_y > 0 or ball.impact.B_x > 0
-            ):
-                event = run.events[run.taken[1]]
-                event[0], event[1], event[2] = now, case, ball.case
-                for i in range(6):
-                    event[3 + i] = ball.impact[i]
-                run.taken[1] += 1
+                count_landings(now, ball.landings - known, run)
+            if ball.case != case or ball.impact.A_y > 0 or ball.impact.B_x > 0:
+                keep_event(now, case, ball.case, ball.impact, run)
         if sampled[s]:
-            keep_sample(ball, ball.P, dt, now, p, run)
-            if now - landed > run.quiet:
-                last = run.taken[0] - 1
-                run.x[last + 1 :] = run.x[last]
-                run.case[last + 1 :] = run.case[last]
+            _keep_sample(ball, ball.P, dt, p, run)
+            if run.times[run.taken[0] - 1] >= run.reached[1]:
                 s = len(starts)
         s, k = s + 1, 0
-    return _in_parts(ball), (s, k, now, landed)
+    return _in_parts(ball), (s, k)

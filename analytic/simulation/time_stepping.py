@@ -26,59 +26,40 @@ from analytic.mechanics import drag, rigid_body
 from analytic.mechanics.contact_problem import NotConvergedError
 from analytic.mechanics.rigid_body import NOTHING
 from analytic.simulation import stepping
-from analytic.simulation.motion import Recorder
+from analytic.simulation.motion import AT_ONCE, Recorder, Rows
 from analytic.simulation.settings import Settings
 from model import Case, Flow, Parameters, State, time_scales
 from model.arrays import Array
 from model.parameters import Range, check_number
 
-AT_ONCE = 10_000
-"""Most steps between two looks at progress and keyboard."""
 MAX_STEPS = 1e9
 """Of a run, an hour or so."""
 
 
-def run(
+def carry_out(
     x0: State, theta_0: float, p: Parameters, flow: Flow, settings: Settings, recorder: Recorder
 ) -> None:
-    """Simulate a run, by time stepping, from state x0 and azimuth theta_0, and write it to the
-    recorder.
+    """Simulate a run, by time stepping, from state x0 and azimuth theta_0.
 
-    The first sample, before any step, carries the forces and the case of the first step. Raises
-    `NotConvergedError`.
-    """
-    times = recorder.times
-    ball, stretches, given = prepared(x0, theta_0, p, flow, settings, times)
-    n, dt, place = len(times), float(stretches.dt[0]), (0, 0, 0.0, 0.0)
-    kept = stepping.Rows(
-        np.empty((n, 8)),
-        np.empty(n, np.int8),
-        np.zeros(n, np.int64),
-        np.empty((n, 9)),
-        np.empty((AT_ONCE, 9)),
-        np.zeros(2, np.int64),
-        math.inf,
-        np.zeros(1, bool),
-    )
-    first = stepping.step(ball, dt, float(flow(dt / 2)), given)
-    ball = ball._replace(case=first.case)
-    stepping.keep_sample(ball, first.P, dt, 0.0, given, kept)
-    try:
-        while place[0] < len(stretches.start):
-            parts, place = stepping.follow(ball, place, stretches, given, kept, AT_ONCE)
-            ball = stepping.ball_from_parts(parts)
-            recorder.note(kept.events[: kept.taken[1]], place[2])
-            kept.taken[1] = 0
-            if ball.residual != 0:
-                dt = stretches.dt[place[0]]
-                raise NotConvergedError(
-                    f"velocities still change by {ball.residual:g} m s-1; a shorter step than "
-                    f"{dt:g} s may help"
-                )
-    finally:
-        count = int(kept.taken[0])
-        time, theta, work = kept.path[:count, :3].T
-        recorder.add(time, theta, kept.x[:count], kept.path[:count, 3:], kept.case[:count], work)
+    Raises `NotConvergedError`."""
+    run, place = recorder.begin(), (0, 0)
+    ball, stretches, given = prepared(x0, theta_0, p, flow, settings, run.times)
+    while place[0] < len(stretches.start):
+        parts, place = stepping.follow(ball, place, stretches, given, run, AT_ONCE)
+        ball = stepping.ball_from_parts(parts)
+        recorder.look()
+        if ball.residual != 0:
+            raise NotConvergedError(
+                f"velocities still change by {ball.residual:g} m s-1; a shorter step than "
+                f"{stretches.dt[place[0]]:g} s may help"
+            )
+        if run.over[0]:
+            raise InterruptedError("nobody wants the run any more")
+
+
+def sample_forces(run: Rows, p: Parameters) -> Array:
+    """Forces of the samples (n, 6), N."""
+    return run.path[: run.taken[0], 2:]
 
 
 def prepared(
@@ -101,16 +82,11 @@ def prepared(
     length = np.diff(knots)
     steps = np.ceil(length / timestep * (1 - 1e-12)).astype(np.int64)
     at = stepping.BallState(theta, x.y, x.h, rigid_body.velocities(x, p))
-    given = p.m, p.r, p.R, p.j, p.mu, p.eta, p.g, settings.restitution, p.fluid_torque
     # an integer would be compiled for itself
+    e = float(settings.restitution)
+    fluid = stepping.FlowArrays(flow.start, flow.value, flow.slope, flow.waves)
     return (
         stepping.Ball(at, NOTHING, NOTHING, int(Case.NN), 0.0, 0, 0.0),
-        stepping.Stretches(
-            knots[:-1],
-            length / steps,
-            steps,
-            np.isin(knots[1:], times),
-            stepping.FlowArrays(flow.start, flow.value, flow.slope, flow.waves),
-        ),
-        stepping.Constants(drag.law(p), *map(float, given)),
+        stepping.Stretches(knots[:-1], length / steps, steps, np.isin(knots[1:], times), fluid),
+        stepping.Constants(drag.law(p), p.m, p.r, p.R, p.j, p.mu, p.eta, p.g, e, p.fluid_torque),
     )

@@ -657,7 +657,7 @@ _FAULTS_FOR_TESTS: dict[str, dict[str, Fault]] = {
             lambda places: [place + 1e-3 for place in places]
         )
     },
-    "simulation.time_stepping.run": {"time stepping with 0.1 % more inertia": other(j=1.001)},
+    "simulation.time_stepping.carry_out": {"time stepping with 0.1 % more inertia": other(j=1.001)},
     "simulation.transitions.collide": {
         "rebounds with nine tenths of the restitution": lambda right, at, k: right(
             at, k._replace(restitution=0.9 * k.restitution)
@@ -703,7 +703,7 @@ _SEEN_BY = {
     "flowmeter.design.best": "other_ways::"
     "test_the_best_design_has_a_wall_as_rough_as_the_inertia_and_the_smallest_ball",
     "stationary.slipping_branch.hopf_places": "other_ways::test_the_hopf_point_of_figure_12",
-    "simulation.time_stepping.run": "other_ways::test_two_methods_end_in_the_same_state",
+    "simulation.time_stepping.carry_out": "other_ways::test_two_methods_end_in_the_same_state",
     "simulation.transitions.collide": "other_ways::test_two_methods_end_in_the_same_state",
     "flowmeter.response.ramp_coefficient": "other_ways::"
     "test_a_slow_ramp_passes_the_fold_as_its_normal_form_does",
