@@ -138,23 +138,19 @@ def sinking_speed(*, nu_f: float, rho_f: float, rho_b: float, r: float, gravity:
     return heavier / (6 * math.pi * rho_f * nu_f * r)
 
 
-def fall(t: Any, y: float, v_y: float, p: Any) -> tuple[Any, Any]:
-    """Height (m) and vertical velocity (m s-1) after a time t (s, float or array) of flight with
-    Stokes' drag.
+def fall(t: float, y: float, v_y: float, p: Any) -> tuple[float, float]:
+    """Height (m) and vertical velocity (m s-1) after a time t (s) of flight with Stokes' drag.
 
     p : anything with c and g
     """
     return y + v_y * t - (p.c * v_y + p.g) * t**2 * ramp_lag(p.c * t), fall_speed(t, v_y, p)
 
 
-def fall_speed(t: Any, v_y: float, p: Any) -> Any:
+def fall_speed(t: float, v_y: float, p: Any) -> float:
     """The vertical velocity of `fall` alone."""
-    decay = (
-        (math.expm1(-p.c * t) if isinstance(t, float) else np.expm1(-p.c * t)) / -p.c
-        if p.c > 0
-        else t
-    )
-    return v_y - (p.c * v_y + p.g) * decay
+    decay = math.expm1(-p.c * t) / -p.c if p.c > 0 else t
+    speed: float = v_y - (p.c * v_y + p.g) * decay
+    return speed
 
 
 def fall_time(y: float, v_y: float, p: Any) -> float:
@@ -179,12 +175,9 @@ def fall_time(y: float, v_y: float, p: Any) -> float:
     return time
 
 
-def ramp_lag(s: Any) -> Any:
+def ramp_lag(s: float) -> float:
     """(s - 1 + exp(-s))/s^2, by its series where that cancels: how a ball with linear drag lags
     behind a ramp."""
-    series = 1 / 2 - s / 6 * (1 - s / 4 * (1 - s / 5 * (1 - s / 6 * (1 - s / 7))))
-    if isinstance(s, float):
-        return series if abs(s) < 1e-2 else (s + math.expm1(-s)) / s**2
-    small = np.abs(s) < 1e-2
-    safe = np.where(small, 1.0, s)
-    return np.where(small, series, (safe + np.expm1(-safe)) / safe**2)
+    if abs(s) < 1e-2:
+        return 1 / 2 - s / 6 * (1 - s / 4 * (1 - s / 5 * (1 - s / 6 * (1 - s / 7))))
+    return (s + math.expm1(-s)) / s**2

@@ -51,29 +51,20 @@ def finish_straight(t: float, of: Stretch, taken: int) -> int:
     k, until, z, scale, times, samples, arm, _ = of
     if len(k.waves) > 0 or k.line.slope != 0:
         return -1
-    rate, there, other = np.empty(len(z)), np.empty(len(z)), np.empty(len(z))
-    values, left = np.empty(len(arm)), until - t
+    n, left = len(z), until - t
+    rate, other, values = np.empty(n), np.empty(n), np.empty(len(arm))
     equations.rates(t, z, k, rate)
-    for i in range(len(z)):
-        if left * abs(rate[i]) < k.rtol * scale[i]:
-            rate[i] = 0.0
+    rate[left * np.abs(rate) < k.rtol * scale] = 0.0
     for ahead in (left / 2, left):
-        for i in range(len(z)):
-            there[i] = z[i] + ahead * rate[i]
+        there = z + ahead * rate
         equations.rates(t + ahead, there, k, other)
-        for i in range(len(z)):
-            if left * abs(other[i] - rate[i]) > k.rtol * scale[i]:
-                return -1
         equations.guards(t + ahead, there, k, values)
-        for value in values:
-            if value < 0:
-                return -1
+        if np.any(left * np.abs(other - rate) > k.rtol * scale) or np.any(values < 0):
+            return -1
     while taken < len(times) and times[taken] <= until:
-        for i in range(len(z)):
-            samples[taken, i] = z[i] + (times[taken] - t) * rate[i]
+        samples[taken, :n] = z + (times[taken] - t) * rate
         taken += 1
-    for i in range(len(z)):
-        z[i] = there[i]
+    z[:] = there
     return taken
 
 
