@@ -96,40 +96,28 @@ def least_utilisation(
     which is finite for all A_y >= 0."""
     u, z = np.broadcast_arrays(*_loads(omega_c, p, omega_0))
     a, k = 1 - p.j * u, (1 + p.j) * u
-    hyp2, rise, narrow = a**2 + z**2, a + 1, k - 2
-    steep_A, steep_B = rise**2 + z**2, 4 + z**2
+    hyp2 = a**2 + z**2
     q_A = np.where(a > 0, _ratio(a, a + hyp2), np.where(hyp2 > 0, 0.0, 1.0))
     q_B = np.where(k + z > 0, _ratio(k, 2 * k + z**2), 0.5)
 
-    def friction(q: Array) -> tuple[Array, Array, Array, Array, Array]:
-        """Friction at A and its limit, the same at B, in one unit; positive where the utilisation
-        of A is larger."""
+    def friction(q: Array) -> tuple[Array, Array, Array, Array]:
+        """Friction at A and its limit, the same at B, in one unit."""
         sideways = (z * q) ** 2
-        at_A, at_B = np.sqrt((rise * q - 1) ** 2 + sideways), np.sqrt((2 * q - 1) ** 2 + sideways)
-        limit_A, limit_B = p.mu * (1 - q), p.eta * np.maximum(narrow * q + 1, 0.0)
-        return at_A, limit_A, at_B, limit_B, at_A * limit_B - at_B * limit_A
+        at_A = np.sqrt(((a + 1) * q - 1) ** 2 + sideways)
+        at_B = np.sqrt((2 * q - 1) ** 2 + sideways)
+        return at_A, p.mu * (1 - q), at_B, p.eta * np.maximum((k - 2) * q + 1, 0.0)
 
-    def excess_of_A(q: Array) -> tuple[Array, Array]:
-        """What is positive where the utilisation of A is larger, and its derivative."""
-        at_A, limit_A, at_B, limit_B, excess = friction(q)
-        turn_A = (steep_A * q - rise) / np.where(at_A > 0, at_A, np.inf)
-        turn_B = (steep_B * q - 2) / np.where(at_B > 0, at_B, np.inf)
-        slope = (
-            turn_A * limit_B
-            + at_A * p.eta * narrow * (limit_B > 0)
-            - turn_B * limit_A
-            + at_B * p.mu
-        )
-        return excess, slope
+    def excess_of_A(q: Array) -> Array:
+        """What is positive where the utilisation of A is larger."""
+        at_A, limit_A, at_B, limit_B = friction(q)
+        return np.asarray(at_A * limit_B - at_B * limit_A)
 
-    first, last = friction(q_A)[-1], friction(q_B)[-1]
-    A_binds, B_binds = first >= 0, last <= 0
-    end = np.where(A_binds, q_A, q_B)
-    start = np.where(A_binds | B_binds, end, q_A)
-    guess = start + first / np.where(first == last, np.inf, first - last) * (end - start)
-    q = roots.zero_of_rising(excess_of_A, start, end, guess)
-    at_A, limit_A, at_B, limit_B, _ = friction(q)
-    use_A, use_B, B_alone = _ratio(at_A, limit_A), _ratio(at_B, limit_B), B_binds & ~A_binds
+    A_binds = excess_of_A(q_A) >= 0
+    B_alone = ~A_binds & (excess_of_A(q_B) <= 0)
+    crossing = roots.sign_change(excess_of_A, q_A, q_B)
+    q = np.where(A_binds, q_A, np.where(B_alone, q_B, crossing))
+    at_A, limit_A, at_B, limit_B = friction(q)
+    use_A, use_B = _ratio(at_A, limit_A), _ratio(at_B, limit_B)
     if np.any(A_binds):
         use_A = np.where(A_binds, _least_utilisation_alone(a, z, p.mu), use_A)
     if np.any(B_alone):

@@ -10,6 +10,9 @@ import numpy.typing as npt
 
 from model.arrays import Array, Real
 
+_MOST = 200
+"""Steps: more than enough for roots whose size is above 1e-44 of the interval, by halving alone."""
+
 
 def sign_change(f: Callable[[Array], Real], start: npt.ArrayLike, end: npt.ArrayLike) -> Array:
     """Where f changes sign between start and end, element by element of arrays of any shape, to the
@@ -41,31 +44,3 @@ def sign_change(f: Callable[[Array], Real], start: npt.ArrayLike, end: npt.Array
                 np.where(trusted, guess, 0.5), np.minimum(least, 0.5), np.maximum(1 - least, 0.5)
             )
     return np.where(changes, np.where(f_a == 0, a, best), np.nan)
-
-
-_MOST, _SHORT = 200, 1e-10
-"""Steps: more than enough for roots whose size is above 1e-44 of the interval, by halving alone;
-and the length of one of Newton's, relative to the root, after which nothing is left."""
-
-
-def zero_of_rising(
-    f: Callable[[Array], tuple[Array, Array]], start: Array, end: Array, guess: Array
-) -> Array:
-    """Where f, given with its derivative, rises through zero on the way from start to end, to the
-    last digits.
-
-    By Newton's method from a guess, or halving where that leaves what is known to hold the root. A
-    step of Newton's leaves about the square of its length."""
-    below, above, root = start, end, guess
-    for _ in range(_MOST):
-        before, (value, slope) = root, f(root)
-        low = value < 0
-        below, above = np.where(low, root, below), np.where(low, above, root)
-        root = root - value / np.where(slope == 0, np.inf, slope)
-        inside = (root - below) * (root - above) <= 0
-        root = np.where(inside, root, (below + above) / 2)
-        if np.all(
-            np.abs(root - before) <= np.where(inside, _SHORT, 2 * math.ulp(1.0)) * np.abs(before)
-        ):
-            break
-    return np.asarray(root)
