@@ -107,6 +107,11 @@ class Impulse(NamedTuple):
     """Tangential, along k."""
 
 
+NO_IMPULSE = Impulse(0.0, 0.0, 0.0)
+Slips = tuple[tuple[float, float], tuple[float, float]]
+"""Slip velocities of A and of B, m s-1."""
+
+
 class NotConvergedError(ArithmeticError):
     """The sweeps did not settle."""
 
@@ -126,14 +131,11 @@ def solve(
         problem, those that the impulses cause among them; a sweep rounds a dozen times, so that
         less than `EXACT` may never be reached
     """
-    share = p.j / (1 + p.j)  # of the mass, that a tangential impulse feels at the contact point
-    v_h, v_y, v_k, o_x, o_y, o_z = free
-    (s_A, t_A), (s_B, t_B) = rigid_body.slip_at_A(free, p), rigid_body.slip_at_B(free, p)
-    a = Impulse(A.target - v_y, -share * s_A, -share * t_A)
-    b = Impulse(B.target - v_h, -share * s_B, -share * t_B)
-    at_A = at_B = Impulse(0.0, 0.0, 0.0)
+    a, b = needs(free, A.target, B.target, ((0.0, 0.0), (0.0, 0.0)), p)
+    at_A = at_B = NO_IMPULSE
     mu, eta, settled = Friction(p.mu, A.s, A.t), Friction(p.eta, B.s, B.t), True
     if A.closed and B.closed:
+        v_h, v_y, v_k, o_x, o_y, o_z = free
         scale = max(abs(v_h), abs(v_y), abs(v_k), p.r * abs(o_x), p.r * abs(o_y), p.r * abs(o_z))
         guess = Impulse(start.B_x / p.m, start.B_y / p.m, start.B_z / p.m)
         at_A, at_B, change = solve_pair(a, b, guess, mu, eta, p.j, tolerance * scale)
@@ -143,8 +145,26 @@ def solve(
         at_A = project(a, mu)
     elif B.closed:
         at_B = project(b, eta)
-    P = Forces(p.m * at_A.s, p.m * at_A.n, p.m * at_A.t, p.m * at_B.n, p.m * at_B.s, p.m * at_B.t)
+    P = impulses(at_A, at_B, p.m)
     return rigid_body.apply(free, P, p), P, settled
+
+
+def needs(
+    free: Velocities, to_A: float, to_B: float, before: Slips, p: Any
+) -> tuple[Impulse, Impulse]:
+    """What A and B need to meet their normal velocities to_A, to_B and to undo their slips, with
+    those `before` added, if the other one gives nothing."""
+    share = p.j / (1 + p.j)  # of the mass, that a tangential impulse feels at the contact point
+    (s_A, t_A), (s_B, t_B) = rigid_body.slip_at_A(free, p), rigid_body.slip_at_B(free, p)
+    (more_s_A, more_t_A), (more_s_B, more_t_B) = before
+    a = Impulse(to_A - free.v_y, -share * (s_A + more_s_A), -share * (t_A + more_t_A))
+    b = Impulse(to_B - free.v_h, -share * (s_B + more_s_B), -share * (t_B + more_t_B))
+    return a, b
+
+
+def impulses(A: Impulse, B: Impulse, m: float) -> Forces:
+    """Impulses of both contacts along the paper's axes, N s."""
+    return Forces(m * A.s, m * A.n, m * A.t, m * B.n, m * B.s, m * B.t)
 
 
 def project(need: Impulse, friction: Friction) -> Impulse:
@@ -152,7 +172,7 @@ def project(need: Impulse, friction: Friction) -> Impulse:
     against known slip."""
     n, s, t = need
     if n <= 0:
-        return Impulse(0.0, 0.0, 0.0)
+        return NO_IMPULSE
     limit = friction.coefficient * n
     if friction.s != 0 or friction.t != 0:
         return Impulse(n, -limit * friction.s, -limit * friction.t)
@@ -166,7 +186,7 @@ def _share_met(need: Impulse, friction: Friction) -> Impulse:
     """Share of the needed friction that `project` grants: 1 sticking, 0 open, else less, with its
     direction (s, t)."""
     if need.n <= 0:
-        return Impulse(0.0, 0.0, 0.0)
+        return NO_IMPULSE
     if friction.s != 0 or friction.t != 0:
         return Impulse(0.0, -friction.s, -friction.t)
     size, limit = math.sqrt(need.s * need.s + need.t * need.t), friction.coefficient * need.n
@@ -194,8 +214,8 @@ def _sweep_rate(
 ) -> Impulse:
     """How the impulse at B after a sweep changes if that before it changes in the direction
     `by`."""
-    still = Impulse(0.0, 0.0, 0.0)
-    return _project_rate(at_B, B, _need(still, _project_rate(at_A, A, _need(still, by, k)), k))
+    by_A = _project_rate(at_A, A, _need(NO_IMPULSE, by, k))
+    return _project_rate(at_B, B, _need(NO_IMPULSE, by_A, k))
 
 
 def _cross(a: Impulse, b: Impulse) -> Impulse:
@@ -242,14 +262,14 @@ def solve_pair(
 
     That is at most `enough` (m s-1) unless `MAX_SWEEPS` were not enough. Sweeps with Newton's
     method count from -`EAGER` up to 0, those after it from 0 on."""
-    k, rough, zero, before = 1 / (1 + j), A.coefficient * B.coefficient, Impulse(0.0, 0.0, 0.0), -1
+    k, rough, before = 1 / (1 + j), A.coefficient * B.coefficient, -1
     at_A, at_B, count = start, start, -EAGER if rough < 1 else 0
     change, last, span, growth = math.inf, math.inf, SPAN, GROWTH
     while count < MAX_SWEEPS:
         attempt, sweeps = count // ATTEMPT, count % ATTEMPT
         if count >= 0 and sweeps == 0:
             last, span, growth = math.inf, SPAN, GROWTH
-            at_B = start if attempt == 0 else zero if attempt == 1 else at_B
+            at_B = start if attempt == 0 else NO_IMPULSE if attempt == 1 else at_B
         need_A = _need(a, at_B, k)
         at_A = project(need_A, A)
         need_B = _need(b, at_A, k)

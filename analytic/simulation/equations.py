@@ -113,12 +113,7 @@ def fluid(t: float, k: System) -> float:
 
 def drag_rate(w_h: float, w_y: float, w_k: float, k: System) -> float:
     """c(|w|) of a velocity relative to the fluid, s-1."""
-    if k.stokes:
-        return k.c
-    linear, wake, blunt = k.law
-    speed = math.sqrt(w_h * w_h + w_y * w_y + w_k * w_k)
-    slow: float = linear + wake * speed**drag.EXPONENT
-    return max(slow, blunt * speed)
+    return k.c if k.stokes else float(drag.rate(drag.speed(w_h, w_y, w_k), k.law))
 
 
 def forces(

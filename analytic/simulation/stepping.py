@@ -9,7 +9,16 @@ import numpy as np
 import numpy.typing as npt
 
 from analytic.mechanics import drag, rigid_body
-from analytic.mechanics.contact_problem import Friction, Impulse, project, solve_pair
+from analytic.mechanics.contact_problem import (
+    NO_IMPULSE,
+    Friction,
+    Impulse,
+    Slips,
+    impulses,
+    needs,
+    project,
+    solve_pair,
+)
 from analytic.mechanics.rigid_body import NOTHING, Forces, Velocities, mean
 from analytic.simulation import compiling
 from analytic.simulation.equations import AWAY, ROLLS, SLIPS
@@ -154,10 +163,6 @@ class Middle(NamedTuple):
     """Of the flow, rad s-1."""
 
 
-Slips = tuple[tuple[float, float], tuple[float, float]]
-"""Slip velocities of A and of B, m s-1."""
-
-
 def solve(
     at: BallState, dt: float, omega_0: float, touching: Touching, start: Forces, p: Constants
 ) -> StepSolution:
@@ -197,9 +202,8 @@ def solve(
     v_h = touching.to_B if B.n > 0 else new.v_h
     v_y = touching.to_A if A.n > 0 else new.v_y
     new = Velocities(v_h, v_y, new.v_k, new.o_x, new.o_y, new.o_z)
-    P = Forces(p.m * A.s, p.m * A.n, p.m * A.t, p.m * B.n, p.m * B.s, p.m * B.t)
     left = 0.0 if converged else _larger_or_nan(change, residual)
-    return StepSolution(new, P, work, middle.spin, left)
+    return StepSolution(new, impulses(A, B, p.m), work, middle.spin, left)
 
 
 def _middle(
@@ -209,11 +213,9 @@ def _middle(
     u = mean(at.u, new)
     x_i = at.h - p.R + dt / 2 * u.v_h
     x_k, spin = (0.0, -u.v_k / x_i) if on_wall else (dt / 2 * u.v_k, 0.0)
+    c = p.law.linear
     if p.law.blunt > 0:
-        w_h, w_k = u.v_h - omega_0 * x_k, u.v_k + omega_0 * x_i
-        c = drag.rate(math.sqrt(w_h * w_h + u.v_y * u.v_y + w_k * w_k), p.law)
-    else:
-        c = p.law.linear
+        c = drag.rate(drag.speed(u.v_h - omega_0 * x_k, u.v_y, u.v_k + omega_0 * x_i), p.law)
     return Middle(u, x_i, x_k, spin, c, omega_0)
 
 
@@ -237,24 +239,12 @@ def _impulses(
 ) -> tuple[Impulse, Impulse, float]:
     """Impulses of A and B per mass that obey Coulomb's law to a tolerance `aim`, near a guess at B;
     and by how much they don't."""
-    (v_h, v_y, v_k, o_x, o_y, o_z), r = free, p.r
-    rest = p.j / (1 + p.j)  # share of m that a tangential impulse feels at the contact point
-    slip_A, slip_B = slips
-    # What either needs to meet its target and to rest if the other one gives nothing.
-    a = Impulse(
-        touching.to_A - v_y,
-        -rest * (v_h + r * o_z + slip_A[0]),
-        -rest * (v_k - r * o_x + slip_A[1]),
-    )
-    b = Impulse(
-        touching.to_B - v_h,
-        -rest * (v_y - r * o_z + slip_B[0]),
-        -rest * (v_k + r * o_y + slip_B[1]),
-    )
-    on_A, on_B, none = Friction(p.mu, 0.0, 0.0), Friction(p.eta, 0.0, 0.0), Impulse(0.0, 0.0, 0.0)
+    a, b = needs(free, touching.to_A, touching.to_B, slips, p)
+    on_A, on_B = Friction(p.mu, 0.0, 0.0), Friction(p.eta, 0.0, 0.0)
     if touching.A and touching.B:
         return solve_pair(a, b, B, on_A, on_B, p.j, aim)
-    return project(a, on_A) if touching.A else none, project(b, on_B) if touching.B else none, 0.0
+    at_A = project(a, on_A) if touching.A else NO_IMPULSE
+    return at_A, project(b, on_B) if touching.B else NO_IMPULSE, 0.0
 
 
 def _pushed(free: Velocities, A: Impulse, B: Impulse, p: Constants) -> Velocities:
@@ -298,24 +288,20 @@ def _old_slip(at: BallState, dt: float, p: Constants) -> Slips:
 
     It is added to the new one, since friction opposes the mean of both where a contact slides on;
     where it may stop, friction opposes the final slip, so that it can't reverse."""
-    v_h, v_y, v_k, o_x, o_y, o_z = at.u
-    r, rest = p.r, p.j / (1 + p.j)
-    slip_A, slip_B = (v_h + r * o_z, v_k - r * o_x), (v_y - r * o_z, v_k + r * o_y)
-    load = SLIDES * (max(p.g * dt - v_y, 0.0) + max(v_k * v_k / (p.R - at.h) * dt - v_h, 0.0))
-    if dt == 0 or rest * _length(slip_A[0], slip_A[1]) <= p.mu * load:
-        slip_A = (0.0, 0.0)
-    if dt == 0 or rest * _length(slip_B[0], slip_B[1]) <= p.eta * load:
-        slip_B = (0.0, 0.0)
-    return slip_A, slip_B
+    u, share, none = at.u, p.j / (1 + p.j), (0.0, 0.0)
+    A, B = rigid_body.slip_at_A(u, p), rigid_body.slip_at_B(u, p)
+    load = SLIDES * (
+        max(p.g * dt - u.v_y, 0.0) + max(u.v_k * u.v_k / (p.R - at.h) * dt - u.v_h, 0.0)
+    )
+    slides_A = dt > 0 and share * _length(A[0], A[1]) > p.mu * load
+    slides_B = dt > 0 and share * _length(B[0], B[1]) > p.eta * load
+    return A if slides_A else none, B if slides_B else none
 
 
 def _first_guess(touching: Touching, start: Forces, m: float) -> tuple[Impulse, Impulse]:
     """Impulses divided by the mass with which the solver starts; zero at an open contact."""
-    A, B = Impulse(0.0, 0.0, 0.0), Impulse(0.0, 0.0, 0.0)
-    if touching.A:
-        A = Impulse(start.A_y / m, start.A_x / m, start.A_z / m)
-    if touching.B:
-        B = Impulse(start.B_x / m, start.B_y / m, start.B_z / m)
+    A = Impulse(start.A_y / m, start.A_x / m, start.A_z / m) if touching.A else NO_IMPULSE
+    B = Impulse(start.B_x / m, start.B_y / m, start.B_z / m) if touching.B else NO_IMPULSE
     return A, B
 
 
@@ -439,12 +425,12 @@ def _impact(at: BallState, dt: float, in_A: bool, in_B: bool, p: Constants) -> S
 def _case_of(s: StepSolution, touching: Touching, p: Constants) -> int:
     """The case from velocities and impulses: a contact that leaves is open, one that doesn't slide
     rolls."""
-    (v_h, v_y, v_k, o_x, o_y, o_z), A, B = s.new, AWAY, AWAY
-    still = ZERO_SLIP * math.sqrt(p.g * p.R)
-    if touching.A and (s.P.A_y > 0 or v_y <= 0):
-        A = ROLLS if _length(v_h + p.r * o_z, v_k - p.r * o_x) <= still else SLIPS
-    if touching.B and (s.P.B_x > 0 or v_h <= 0):
-        B = ROLLS if _length(v_y - p.r * o_z, v_k + p.r * o_y) <= still else SLIPS
+    A, B, still = AWAY, AWAY, ZERO_SLIP * math.sqrt(p.g * p.R)
+    slip_A, slip_B = rigid_body.slip_at_A(s.new, p), rigid_body.slip_at_B(s.new, p)
+    if touching.A and (s.P.A_y > 0 or s.new.v_y <= 0):
+        A = ROLLS if _length(slip_A[0], slip_A[1]) <= still else SLIPS
+    if touching.B and (s.P.B_x > 0 or s.new.v_h <= 0):
+        B = ROLLS if _length(slip_B[0], slip_B[1]) <= still else SLIPS
     return 3 * A + B
 
 

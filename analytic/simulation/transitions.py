@@ -60,27 +60,11 @@ def react(guard: int, case: int, at: HybridState, k: System) -> tuple[int, Hybri
     still = 10 * k.rtol * k.spin  # slip that counts as zero where the other contact has just stuck
     if guard in (A_SLIPS, B_SLIPS):
         # Slip sets in against the friction of the contact that rolls so far.
-        lag = x.omega_c - equations.fluid(at.time, k)
         if case == RN:
-            return (
-                3 * SLIPS + B,
-                with_directions(at, x, math.atan2((k.R - x.h) * lag, -x.v_h), at.beta),
-                NOTHING,
-            )
-        c = equations.drag_rate(x.v_h, x.v_y, k.R * lag, k)
-        A_x, _, A_z, _, B_y, B_z = equations.forces(
-            case,
-            x.omega_c,
-            x.v_y,
-            x.slip_x,
-            c,
-            lag,
-            math.sin(at.alpha),
-            math.cos(at.alpha),
-            math.sin(at.beta),
-            math.cos(at.beta),
-            k,
-        )
+            lag = x.omega_c - equations.fluid(at.time, k)
+            alpha = math.atan2((k.R - x.h) * lag, -x.v_h)
+            return 3 * SLIPS + B, with_directions(at, x, alpha, at.beta), NOTHING
+        A_x, _, A_z, _, B_y, B_z = _forces(case, at, k)
         if guard == A_SLIPS:
             return 3 * SLIPS + B, with_directions(at, x, math.atan2(A_z, -A_x), at.beta), NOTHING
         return 3 * A + SLIPS, with_directions(at, x, at.alpha, math.atan2(-B_z, B_y)), NOTHING
@@ -152,12 +136,9 @@ def leave(at: HybridState, k: System) -> tuple[int, HybridState]:
     Friction is full where slip sets in and opposes it: forces and rates pass continuously from
     rolling to slipping. Beyond the onset the contact problem may have a solution that rolls, too:
     one that moves is reached from the forces at which rolling gives way."""
-    omega_c, lag = at.x.omega_c, at.x.omega_c - equations.fluid(at.time, k)
-    u, z = equations.loads(omega_c, at.time, k)
-    B_y, c = equations.last_share(u, z, k) * k.m * k.g, equations.drag_rate(0.0, 0.0, k.R * lag, k)
-    A_x, A_y, A_z, B_x, _, B_z = equations.forces(
-        RR, omega_c, 0.0, 0.0, c, lag, 0.0, 0.0, 0.0, 0.0, k
-    )
+    u, z = equations.loads(at.x.omega_c, at.time, k)
+    B_y = equations.last_share(u, z, k) * k.m * k.g
+    A_x, A_y, A_z, B_x, _, B_z = _forces(RR, at, k)
     A_x, A_y, B_x = A_x + B_y, A_y - B_y, B_x - B_y
     if equations.slip_margin(u, z, k) <= -AT_ONSET:
         return _by_accelerations(at, RESTS, RESTS, Forces(A_x, A_y, A_z, B_x, B_y, B_z), k)
@@ -168,6 +149,17 @@ def leave(at: HybridState, k: System) -> tuple[int, HybridState]:
     if abs(A_x) <= 16 * EPS * B_y:
         return SR, with_directions(at, at.x, alpha, math.nan)
     return SS, with_directions(at, at.x, alpha, beta)
+
+
+def _forces(
+    case: int, at: HybridState, k: System
+) -> tuple[float, float, float, float, float, float]:
+    """Forces of floor and wall in a case at the wall, as `equations.forces`, N."""
+    x, lag = at.x, at.x.omega_c - equations.fluid(at.time, k)
+    s_A, c_A = math.sin(at.alpha), math.cos(at.alpha)
+    s_B, c_B = math.sin(at.beta), math.cos(at.beta)
+    c = equations.drag_rate(x.v_h, x.v_y, k.R * lag, k)
+    return equations.forces(case, x.omega_c, x.v_y, x.slip_x, c, lag, s_A, c_A, s_B, c_B, k)
 
 
 def _contact(closed: bool, s: float, t: float) -> Closed:
