@@ -27,6 +27,7 @@ _INTEGRATORS = {
 _PYRAMID = int(mujoco.mjtConstraint.mjCNSTR_CONTACT_PYRAMIDAL)
 _MOST_STEPS, _LARGEST = 2**31 - 1, sys.float_info.max
 _ELLIPTIC = int(mujoco.mjtCone.mjCONE_ELLIPTIC)
+_PGS, _NEWTON = int(mujoco.mjtSolver.mjSOL_PGS), int(mujoco.mjtSolver.mjSOL_NEWTON)
 _NO_ACTUATION = int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
 _NO_DAMPING = int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
 
@@ -346,9 +347,11 @@ class Coulomb:
         """
         option, h, model = self.model.opt, self.model.opt.timestep, self.model
         cone, integrator, flags = option.cone, option.integrator, option.disableflags
-        accuracy = option.ccd_tolerance
+        accuracy, solver = option.ccd_tolerance, option.solver
         armature, times = model.tendon_armature.copy(), (0.0, 0.0)
         option.cone, implicit = _ELLIPTIC, integrator != _EULER
+        # from no force PGS only tries a normal one, which De Saxcé's shift keeps at none
+        option.solver = _NEWTON if solver == _PGS else solver
         if self._law.rigid:
             times = h * (implicit or not flags & _NO_DAMPING), h * implicit
             option.integrator, option.disableflags = _EULER, flags | _NO_DAMPING
@@ -359,7 +362,7 @@ class Coulomb:
 
         def back() -> None:
             option.cone, option.integrator, option.disableflags = cone, integrator, flags
-            option.ccd_tolerance = accuracy
+            option.ccd_tolerance, option.solver = accuracy, solver
             model.tendon_armature[:] = armature
 
         return times, back

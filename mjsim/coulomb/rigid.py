@@ -14,7 +14,7 @@ import mujoco
 
 from .compiling import kernel
 from .contacts import smaller_radius
-from .engine import integers, mj_factorM, mj_projectConstraint, reals
+from .engine import integers, mj_factorM, reals
 from .friction import shift
 from .memory import SLIDES, bodies_at, contacts_of, rows_of
 from .parameters import APART, BOUNCES, ITERATIONS, STUCK, USUAL_STEP
@@ -22,8 +22,6 @@ from .parameters import APART, BOUNCES, ITERATIONS, STUCK, USUAL_STEP
 AFFINE, JOINT = int(mujoco.mjtBias.mjBIAS_AFFINE), int(mujoco.mjtTrn.mjTRN_JOINT)
 FREE, SLIDE = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 BIASES = int(mujoco.mjNBIAS)
-PGS = 0
-"""MuJoCo's solver that has the regularisation in its matrix."""
 
 
 # -- contacts --------------------------------------------------------------------------------------
@@ -88,13 +86,8 @@ def rebound(
 
 
 @kernel
-def share_softness(model: Any, data: Any, memory: Any) -> None:
-    """Tell the R of contacts to all places where MuJoCo keeps it: D, islands, the matrix of PGS.
-
-    If its memory is too small for that, it drops all rows.
-    """
-    if data.nefc != memory.rows:
-        return
+def share_softness(data: Any, memory: Any) -> None:
+    """Tell the R of contacts to all places where MuJoCo keeps it: D, islands."""
     R, D = reals(data.efc_R, data.nefc), reals(data.efc_D, data.nefc)
     island_R, island_D = reals(data.iefc_R, data.nefc), reals(data.iefc_D, data.nefc)
     place, contacts = integers(data.map_efc2iefc, data.nefc), contacts_of(memory)
@@ -104,8 +97,6 @@ def share_softness(model: Any, data: Any, memory: Any) -> None:
             R[r], D[r] = rows[r].R, 1 / rows[r].R
             if data.nisland > 0:
                 island_R[place[r]], island_D[place[r]] = R[r], D[r]
-    if model.opt.solver == PGS:
-        mj_projectConstraint(memory.model, memory.data)
 
 
 @kernel

@@ -87,10 +87,7 @@ def law_of_a_step(m: int, d: int, at: int) -> None:
     elif rigid:
         oppose_slip_at_mid_step(model, data, memory, gravity)
     if rigid:
-        share_softness(model, data, memory)
-        if data.nefc != memory.rows:  # MuJoCo's memory was too small
-            forget_contacts(memory)
-            return
+        share_softness(data, memory)
     write_references(data, memory)
 
 
@@ -232,8 +229,7 @@ def solve(model: Any, data: Any, memory: Any, enough: float, gravity: float, kno
     if memory.law.rigid:
         if not known:  # loads that contacts can bear in many ways are shared as MuJoCo has it
             iterate(model, data, memory, start, enough)
-        if data.nefc == memory.rows:
-            solved = solve_rigid(model, data, memory, start, enough, gravity)
+        solved = solve_rigid(model, data, memory, start, enough, gravity)
     if not solved:
         solved = iterate(model, data, memory, start, enough)
     memory.unsolved += not solved
@@ -261,8 +257,8 @@ def iterate(model: Any, data: Any, memory: Any, start: Any, enough: float) -> bo
     contacts, rows = contacts_of(memory), rows_of(memory)
     acceleration = reals(data.qacc, model.nv)
     if memory.law.rigid:
-        share_softness(model, data, memory)
-    for _ in range(memory.law.most if data.nefc == memory.rows else 0):
+        share_softness(data, memory)
+    for _ in range(memory.law.most):
         write_references(data, memory)
         mj_fwdConstraint(memory.model, memory.data)
         for i in range(model.nv):
