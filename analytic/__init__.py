@@ -1,7 +1,5 @@
 """The model in closed form: what the equations of the paper say the ball does."""
 
-from typing import TYPE_CHECKING, Any
-
 import model
 
 if not hasattr(model, "Parameters"):
@@ -22,6 +20,7 @@ from analytic.flowmeter.characteristic import (
     unloading_limit,
 )
 from analytic.mechanics.dynamics import contact_forces, vector_field
+from analytic.orbits.attractors import attractors
 from analytic.simulation.ensemble import Ensemble, simulate_many
 from analytic.simulation.settings import Settings
 from analytic.simulation.simulator import simulate
@@ -35,9 +34,6 @@ from analytic.stationary.solutions import (
     stable_solutions,
     stationary_solutions,
 )
-
-if TYPE_CHECKING:
-    from analytic.orbits.attractors import attractors
 
 __all__ = [
     "Ensemble",
@@ -66,13 +62,3 @@ __all__ = [
     "unloading_limit",
     "vector_field",
 ]
-
-
-def __getattr__(name: str) -> Any:
-    """`attractors` when it is asked for: the formulas don't wait for its integrators and statistics
-    to load."""
-    if name == "attractors":
-        from analytic.orbits.attractors import attractors
-
-        return attractors
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

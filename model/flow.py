@@ -13,7 +13,7 @@ import numpy.typing as npt
 from model import table
 from model.arrays import Array
 from model.errors import InputError
-from model.parameters import ANY, NOT_NEGATIVE, POSITIVE, REACH, Range, check_number
+from model.parameters import NOT_NEGATIVE, POSITIVE, REACH, Range, check_number
 
 GAP = 10.0
 """An interval this many times the usual one (the median) is a gap in a measured flow: it wasn't
@@ -113,17 +113,13 @@ class Flow:
         """The sum of a mean and waves (amplitude, frequency, phase) as in `sine`."""
         flow = cls._from_pieces("sines", [0.0], [mean], [0.0])
         frequencies = Range(0.0, REACH.high, open=True)
-        kinds = (
-            ("amplitude", "rad s-1", REACH),
-            ("frequency", "Hz", frequencies),
-            ("phase", "rad", ANY),
-        )
         rows = [
-            [
-                check_number(f"{n} of wave {k}", x, unit, of)
-                for x, (n, unit, of) in zip(wave, kinds, strict=True)
-            ]
-            for k, wave in enumerate(waves)
+            (
+                check_number(f"amplitude of wave {k}", amplitude, "rad s-1", REACH),
+                check_number(f"frequency of wave {k}", frequency, "Hz", frequencies),
+                check_number(f"phase of wave {k}", phase, "rad"),
+            )
+            for k, (amplitude, frequency, phase) in enumerate(waves)
         ]
         return replace(flow, waves=np.array(rows).reshape(-1, 3))
 

@@ -70,21 +70,17 @@ def sensitivities(make: Make, at: Mapping[str, float]) -> dict[str, dict[str, Se
         with np.errstate(divide="ignore"):
             return np.log([getattr(t, key) for key in THRESHOLDS])
 
-    by_name = {}
-    with np.errstate(invalid="ignore"):
-        for name in at:
+    found: dict[str, dict[str, Sensitivity]] = {key: {} for key in THRESHOLDS}
+    for name in at:
+        with np.errstate(invalid="ignore"):
             wide, narrow = (
                 (log_thresholds(name, h) - log_thresholds(name, -h)) / (2 * h)
                 for h in (_LOG_STEP, _LOG_STEP / 2)
             )
-            by_name[name] = (4 * narrow - wide) / 3, np.abs(narrow - wide) / 3
-    return {
-        key: {
-            name: Sensitivity(float(value[k]), float(error[k]))
-            for name, (value, error) in by_name.items()
-        }
-        for k, key in enumerate(THRESHOLDS)
-    }
+            values, errors = (4 * narrow - wide) / 3, np.abs(narrow - wide) / 3
+        for key, value, error in zip(THRESHOLDS, values.tolist(), errors.tolist(), strict=True):
+            found[key][name] = Sensitivity(value, error)
+    return found
 
 
 def corners(
@@ -106,11 +102,9 @@ def corners(
 def threshold_spread(meters: Sequence[Parameters]) -> dict[str, Interval]:
     """Lowest and highest value of each threshold over some meters, rad s-1; nan if one of them
     doesn't have it."""
-    each = [dataclasses.asdict(bifurcation.thresholds(p)) for p in meters]
-    return {
-        key: (float(np.min([t[key] for t in each])), float(np.max([t[key] for t in each])))
-        for key in THRESHOLDS
-    }
+    each = np.array([[getattr(bifurcation.thresholds(p), k) for k in THRESHOLDS] for p in meters])
+    ends = each.min(axis=0).tolist(), each.max(axis=0).tolist()
+    return {key: (low, high) for key, low, high in zip(THRESHOLDS, *ends, strict=True)}
 
 
 def readings(p: Parameters, omega_0: npt.ArrayLike) -> tuple[Array, Array]:
@@ -197,13 +191,9 @@ def best(
     exact = {name: low for name, (low, _) in bounds.items()}
 
     def meter_at(unit: npt.ArrayLike) -> Choice:
-        chosen = ends[:, 0] + np.asarray(unit) * (ends[:, 1] - ends[:, 0])
-        return choice(
-            make,
-            {**exact, **dict(zip(open_names, chosen.tolist(), strict=True))},
-            tolerances,
-            fastest,
-        )
+        chosen = (ends[:, 0] + np.asarray(unit) * (ends[:, 1] - ends[:, 0])).tolist()
+        values = {**exact, **dict(zip(open_names, chosen, strict=True))}
+        return choice(make, values, tolerances, fastest)
 
     def cost(unit: Array) -> float:
         c = meter_at(unit)

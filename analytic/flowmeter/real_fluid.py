@@ -89,10 +89,8 @@ def rolling(p: Parameters, layer: bool = True) -> Rolling:
     omega_c = float(roots.sign_change(excess_friction, -flow * max(1.0, p.r / (2 * p.R)), flow))
     turn = relative_spin(omega_c)
     k, Re = float(torque_rate(turn, p, layer)), turn * p.r**2 / p.nu_f if p.nu_f else math.nan
-    u, z_A, z_B = (
-        p.R * omega_c**2 / p.g,
-        *(p.j * k * (p.R * omega_c + more) / p.g for more in (0.0, p.r * flow)),
-    )
+    u = p.R * omega_c**2 / p.g
+    z_A, z_B = (p.j * k * (p.R * omega_c + more) / p.g for more in (0.0, p.r * flow))
     # As in `rolling_forces`, with B_y = s m g free, but with forces along the orbit that differ.
     s = np.linspace(0.0, min(p.j * u, 1.0), _SHARES)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -19,7 +19,6 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.integrate import solve_ivp
 
 from analytic.mechanics import dynamics
 from analytic.simulation.settings import Settings
@@ -96,16 +95,8 @@ class Loop:
         tops = 1 + np.flatnonzero((y[1:-1] > y[:-2]) & (y[1:-1] >= y[2:]))
         if len(tops):
             top = int(tops[np.argmax(y[tops])])
-            state = State.of(run.x[top])._replace(v_y=0.0)
-            return cls(
-                p,
-                run.cases[top],
-                state.stacked(),
-                period,
-                VARIABLES.index("v_y"),
-                size,
-                restitution,
-            )
+            x, v_y = State.of(run.x[top])._replace(v_y=0.0).stacked(), VARIABLES.index("v_y")
+            return cls(p, run.cases[top], x, period, v_y, size, restitution)
         stretches = [each for each in run.phases() if each[0] is not Case.RR]
         if not stretches:
             raise NoOrbitError(f"the ball rolls at both points all the time (period {period:g} s)")
@@ -162,6 +153,8 @@ class Loop:
 
         It is simulated for the period, and then followed to the section nearby, forwards or
         backwards, by the equations of the case."""
+
+        from scipy.integrate import solve_ivp  # here, because it takes half a second to load
 
         def rates(t: float, z: Array) -> list[float]:
             return list(dynamics.rates(self.case, z.tolist(), self.p, self.p.omega_0))

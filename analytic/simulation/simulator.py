@@ -72,12 +72,8 @@ def simulate(
     times = sample_times(t_end, sample_interval)
     check_duration(p, flow, float(times[-1]), x)
     theta_0 = check_number("theta_0", theta_0, "rad")
-    start, (first, second, *_) = {"x0": list(x), "theta_0": theta_0}, times.tolist()
-    shown = (
-        dataclasses.asdict(settings)
-        | start
-        | {"t_end": float(times[-1]), "sample_interval": second - first}
-    )
+    ends = {"t_end": float(times[-1]), "sample_interval": float(times[1] - times[0])}
+    shown = dataclasses.asdict(settings) | {"x0": list(x), "theta_0": theta_0} | ends
     recorder, by = Recorder.whole(times, progress), simulator(settings)
     header = Header(settings.method, p, flow, shown)
     try:

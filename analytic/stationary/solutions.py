@@ -210,14 +210,8 @@ def _rr(p: Parameters) -> list[StationarySolution]:
     """Proposition 1: the ball rolls round with the fluid. Without drag every omega_c is
     stationary."""
     best = rolling_forces.least_utilisation(p.omega_0, p)
-    return [
-        _solution(
-            Case.RR,
-            p,
-            State(omega_c=p.omega_0),
-            bool(best.utilisation <= 1 and not np.isnan(best.B_y)),
-        )
-    ]
+    exists = bool(best.utilisation <= 1 and not np.isnan(best.B_y))
+    return [_solution(Case.RR, p, State(omega_c=p.omega_0), exists)]
 
 
 def _rs(p: Parameters) -> list[StationarySolution]:
@@ -254,11 +248,8 @@ def _ss(p: Parameters) -> list[StationarySolution]:
     solutions = []
     for s in slipping_branch.points_at(p):
         x, values = State.of(slipping_branch.states(s, p)[0]), slipping_branch.eigenvalues_at(s, p)
-        solutions.append(
-            replace(
-                _solution(Case.SS, p, x, True, smooth, values), alpha=-float(np.arctan(np.exp(s)))
-            )
-        )
+        found = _solution(Case.SS, p, x, True, smooth, values)
+        solutions.append(replace(found, alpha=-float(np.arctan(np.exp(s)))))
     return solutions
 
 
