@@ -60,7 +60,7 @@ lint: $(VENV)/installed-dev
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-docs: $(VENV)/installed-dev
+docs: $(VENV)/installed-docs
 	$(BIN)/sphinx-build -q -W --keep-going docs docs/_build/html
 
 wheel:
@@ -82,12 +82,15 @@ league: $(VENV)/installed-engines
 $(VENV)/installed: requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "dualball needs Python 3.11 or newer; name one with: make PYTHON=python3.12 $(MAKECMDGOALS)"; exit 1; }
 	$(PYTHON) -m venv $(VENV)
-	@.ci/install $(BIN)/python --require-hashes -r requirements.lock
-	@.ci/install $(BIN)/python --no-deps -e .
+	@.ci/install $(BIN)/python requirements.lock -e .
 	@touch $@
 
 $(VENV)/installed-dev: requirements-dev.lock $(VENV)/installed
-	@.ci/install $(BIN)/python --require-hashes -r requirements-dev.lock
+	@.ci/install $(BIN)/python requirements-dev.lock
+	@touch $@
+
+$(VENV)/installed-docs: requirements-docs.lock $(VENV)/installed-dev
+	@.ci/install $(BIN)/python requirements-docs.lock
 	@touch $@
 
 ENGINES := drake pybullet
@@ -96,14 +99,15 @@ $(VENV)/installed-engines: requirements-engines.lock $(VENV)/installed
 	    awk -v own=$$engine -v all="$(ENGINES)" 'BEGIN { n = split(all, each, " ") } \
 	        /^[a-z]/ { on = 1; for (k = 1; k <= n; k++) if (each[k] != own && index($$0, each[k] "==") == 1) on = 0 } on' \
 	        $< >$(VENV)/$$engine.txt; \
-	    .ci/install $(BIN)/python --require-hashes --only-binary :all: -r $(VENV)/$$engine.txt || \
+	    PIP_ONLY_BINARY=:all: .ci/install $(BIN)/python $(VENV)/$$engine.txt || \
 	        echo "the league goes on without $$engine, which has no wheel for this Python"; \
 	done
 	@touch $@
 
 lock:
 	uv pip compile --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --extra xarray -o requirements.lock
-	uv pip compile --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --extra xarray --group dev -c requirements.lock -o requirements-dev.lock
+	uv pip compile --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 --group docs -c requirements.lock -o requirements-docs.lock
+	uv pip compile --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml --extra xarray --group dev -c requirements.lock -c requirements-docs.lock -o requirements-dev.lock
 	echo $(ENGINES) | tr ' ' '\n' | uv pip compile --universal --generate-hashes --no-header --no-emit-index-url --python-version 3.11 pyproject.toml - -c requirements.lock -o requirements-engines.lock
 
 clean:
