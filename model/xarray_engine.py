@@ -8,10 +8,10 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray
 from xarray.backends import BackendEntrypoint
 
-from model.cases import Case
 from model.errors import InputError
 from model.trajectory import COMPONENTS, FLUID, Trajectory, attributes, columns
 
@@ -42,14 +42,10 @@ class RunBackend(BackendEntrypoint):
         metas = {name: about[column] for name, (column, _) in COMPONENTS.items()} | {
             "omega_0": FLUID
         }
-        found = xarray.Dataset(
-            {
-                name: ("time", values, attributes(metas[name]))
-                for name, values in run.table().items()
-            },
-            attrs=run.header.attributes(),
-        )
-        names = [Case(code).name for code in run.case]
-        return found.assign(
-            case=("time", names, {"long_name": about["case"]["long_name"]})
-        ).drop_vars(drop_variables or (), errors="ignore")
+        found = {
+            name: ("time", values, attributes(metas[name])) for name, values in run.table().items()
+        }
+        names = [case.name for case in run.cases]
+        found["case"] = "time", np.array(names), {"long_name": about["case"]["long_name"]}
+        whole = xarray.Dataset(found, attrs=run.header.attributes())
+        return whole.drop_vars(drop_variables or (), errors="ignore")

@@ -208,11 +208,8 @@ def _follow_to_attractor(
         if extent(now) < STATIONARY_RANGE and extent(now) <= extent(before):
             return LimitSet(Kind.STATIONARY, now, solution=_nearest_solution(now, solutions))
         if recurrent := _windows_agree(before, now):
-            same = (
-                limit
-                for limit, *_ in known
-                if limit.kind is not Kind.UNDECIDED and _windows_agree(limit.last, now)
-            )
+            decided = (limit for limit, *_ in known if limit.kind is not Kind.UNDECIDED)
+            same = (limit for limit in decided if _windows_agree(limit.last, now))
             if limit := next(same, None) or periodic_limit(now):
                 return limit
     if not recurrent:
@@ -221,20 +218,15 @@ def _follow_to_attractor(
         exponent, deviation = lyapunov(p, *_highest_state(seen[-1]), GROWING * unit, unit, run)
     except (SimulationError, InputError) as reason:
         return LimitSet(Kind.UNDECIDED, seen[-1], failure=str(reason))
-    return LimitSet(
-        Kind.CHAOTIC if exponent > 3 * deviation else Kind.QUASI_PERIODIC,
-        seen[-1],
-        exponent=exponent,
-    )
+    kind = Kind.CHAOTIC if exponent > 3 * deviation else Kind.QUASI_PERIODIC
+    return LimitSet(kind, seen[-1], exponent=exponent)
 
 
 def _windows_agree(a: Trajectory, b: Trajectory) -> bool:
     """Whether means and extremes of two windows agree, relative to the range of the motion."""
     size = state_units(a.header.parameters) * max(extent(a), STATIONARY_RANGE)
-    return all(
-        bool(np.all(np.abs(of(a.x, axis=0) - of(b.x, axis=0)) <= ALIKE * size))
-        for of in (np.mean, np.min, np.max)
-    )
+    off = [of(a.x, axis=0) - of(b.x, axis=0) for of in (np.mean, np.min, np.max)]
+    return bool(np.all(np.abs(off) <= ALIKE * size))
 
 
 def _nearest_solution(
@@ -266,10 +258,8 @@ def periodic_limit(last: Trajectory) -> LimitSet | None:
         [np.abs(z[-n // 4 :: 5] - z[-n // 4 - lag : len(z) - lag : 5]).max() for lag in range(n)]
     )
     left = int(np.argmax(away > size / 2))
-    dips = np.array(
-        [k for k in range(left + 1, n - 1) if away[k] <= away[k - 1] and away[k] < away[k + 1]],
-        dtype=int,
-    )
+    inner = np.arange(left + 1, n - 1)
+    dips = inner[(away[inner] <= away[inner - 1]) & (away[inner] < away[inner + 1])]
     good = dips[away[dips] <= 2 * away[dips].min(initial=size) + ALIKE * size]
     seen = [(float(k * interval), float(away[k])) for k in good[:3]]
     for period, _ in seen:

@@ -189,10 +189,8 @@ def _one_way(
         before.append(here)
         if here.loop.extent < SMALL * max(each.loop.extent for each in before):
             # The extent will be zero where a parabola through the last three orbits says.
-            last, (kind, power) = (
-                before[-3:],
-                (Bifurcation.BIRTH, 1) if here.changes else (Bifurcation.HOPF, 2),
-            )
+            kind, power = (Bifurcation.BIRTH, 1) if here.changes else (Bifurcation.HOPF, 2)
+            last = before[-3:]
             sizes = np.array([each.loop.extent for each in last]) ** power
             values = np.array([each.loop.value(name) for each in last])
             yield Place(kind, float(np.polyfit(sizes, values, len(last) - 1)[-1]), here)

@@ -174,11 +174,8 @@ class Loop:
             late += short
             if not abs(late) < self.period / 4:
                 raise NoOrbitError(f"after {self.period:g} s the ball is far from where it was")
-            x = np.asarray(
-                solve_ivp(rates, (0.0, short), x, "DOP853", rtol=RETURN_RTOL, atol=tolerance).y[
-                    :, -1
-                ]
-            )
+            path = solve_ivp(rates, (0.0, short), x, "DOP853", rtol=RETURN_RTOL, atol=tolerance)
+            x = np.asarray(path.y[:, -1])
         changes = tuple(
             (Case(a), Case(b))
             for a, b in zip(run.events.from_case, run.events.to_case, strict=True)

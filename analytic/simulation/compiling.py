@@ -71,14 +71,8 @@ def _called(function: Callable[..., Any]) -> set[Callable[..., Any]]:
     found, todo = set[Callable[..., Any]](), [function]
     while todo:
         code, known = (one := todo.pop()).__code__, one.__globals__
-        places = [
-            known,
-            *(
-                vars(known[name])
-                for name in code.co_names
-                if isinstance(known.get(name), ModuleType)
-            ),
-        ]
+        modules = (each for each in map(known.get, code.co_names) if isinstance(each, ModuleType))
+        places: list[Any] = [known, *map(vars, modules)]
         for each in (place.get(name) for place in places for name in code.co_names):
             ours = isinstance(each, FunctionType) and each.__module__.startswith("analytic.")
             if ours and each not in found:

@@ -126,12 +126,9 @@ def stability(case: Case, p: Parameters, omega_c: float | None = None) -> SlipSt
     Omega2 = p.R / p.g * (p.omega_0 if omega_c is None else omega_c) ** 2
     match case:
         case Case.RR:
-            divisor = p.mu * p.eta * (1 + p.j) + p.j - p.eta
-            slip = (
-                (Omega2 * divisor, p.mu * (1 + p.eta))
-                if p.eta < p.j
-                else (p.mu * p.j * Omega2, p.mu)
-            )
+            slip = p.mu * p.j * Omega2, p.mu
+            if p.eta < p.j:
+                slip = Omega2 * (p.mu * p.eta * (1 + p.j) + p.j - p.eta), p.mu * (1 + p.eta)
             kinds = {_by_sign(0.0, p.eta * Omega2), _by_sign(*slip)}
         case Case.SR | Case.NR:
             # the floor then carries the weight, the wall nothing
