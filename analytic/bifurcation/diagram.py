@@ -190,18 +190,15 @@ def case_map(
     slips = (eta < p.j) & (mu > 0) & (p.c > 0)
     folds = np.isfinite(four)
     carried = two <= Omega
-    flags = [
-        (Exists.RR, end_of_rr >= Omega),
-        (Exists.SS, slips & (one < Omega) & (Omega < np.where(folds, four, two))),
-        (Exists.SS_BEYOND_FOLD, folds & (two < Omega) & (four > Omega)),
-        (Exists.SR, carried),
-        (Exists.NR, carried),
-        (Exists.NS, ~carried & (p.c > 0)),
-    ]
-    plane = np.zeros(np.broadcast_shapes(eta.shape, Omega.shape), dtype=np.uint8)
-    for flag, where in flags:
-        plane |= np.where(where, np.uint8(flag), np.uint8(0))
-    return plane
+    where = {
+        Exists.RR: end_of_rr >= Omega,
+        Exists.SS: slips & (one < Omega) & (Omega < np.where(folds, four, two)),
+        Exists.SS_BEYOND_FOLD: folds & (two < Omega) & (four > Omega),
+        Exists.SR: carried,
+        Exists.NR: carried,
+        Exists.NS: ~carried & (p.c > 0),
+    }
+    return np.asarray(sum(np.uint8(flag) * there for flag, there in where.items()), np.uint8)
 
 
 def wall_spin(state: State, p: Parameters) -> Real:

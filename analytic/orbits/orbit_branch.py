@@ -139,63 +139,60 @@ def _one_way(
 ) -> Iterator[Orbit | Place]:
     """Follow the branch from an orbit towards larger (sign 1) or smaller values: orbits and places,
     to its end."""
-    here, step, before, reason = start, FIRST_STEP, [start], ""
+    here, step, before = start, FIRST_STEP, [start]
     along = np.append(np.zeros(len(start.loop.free)), sign)
-    for _ in range(most):
-        try:
+    try:
+        for _ in range(most):
             matrix = defect_jacobian(here.loop, here.derivative, name)
-        except NoOrbitError as error:
-            yield Place(Bifurcation.LOST, here.loop.value(name), here, str(error))
-            return
-        tangent = np.linalg.svd(matrix)[2][-1]
-        along = tangent if tangent @ along >= 0 else -tangent
-        there = None
-        while there is None and step > LEAST_STEP:
-            try:
-                there = _next_orbit(here, step * along, name, matrix)
-            except NoOrbitError as error:
-                step, reason = step / 2, str(error)
-        if there is None:
-            yield Place(Bifurcation.LOST, here.loop.value(name), here, reason)
-            return
-        met = _places_between(here, there, step * along, name, matrix)
-        yield from (place for place in met if span[0] <= place.value <= span[1])
-        if not span[0] <= there.loop.value(name) <= span[1]:
-            # The orbit where the branch leaves the range, between the last within it and the first
-            # outside.
-            inside, outside = here.loop.value(name), there.loop.value(name)
-            value = min(max(outside, span[0]), span[1])
-            share = (value - inside) / (outside - inside)
-            x = here.loop.x + share * (there.loop.x - here.loop.x)
-            period = (1 - share) * here.period
-            try:
-                loop = here.loop.with_value(name, value)
-                orbit = closed_orbit(replace(loop, x=x, period=period + share * there.period))
-            except NoOrbitError as error:
-                yield Place(Bifurcation.LOST, inside, here, str(error))
+            tangent = np.linalg.svd(matrix)[2][-1]
+            along = tangent if tangent @ along >= 0 else -tangent
+            there = None
+            while there is None:
+                try:
+                    there = _next_orbit(here, step * along, name, matrix)
+                except NoOrbitError:
+                    step /= 2
+                    if step <= LEAST_STEP:
+                        raise
+            met = _places_between(here, there, step * along, name, matrix)
+            yield from (place for place in met if span[0] <= place.value <= span[1])
+            if not span[0] <= there.loop.value(name) <= span[1]:
+                orbit = _at_end_of_range(here, there, name, span)
+                yield from (orbit, Place(Bifurcation.RANGE, orbit.loop.value(name), orbit))
+                return
+            yield there
+            step = min(LONGEST_STEP, 1.5 * step if there.steps <= EASY else 0.7 * step)
+            # The same orbit through a section anew: on the floor orbits may shrink away from one.
+            if State.of(there.loop.x).y > 0:
+                here = replace(there, loop=replace(there.loop, extent=extent(there.cycle)))
             else:
-                yield from (orbit, Place(Bifurcation.RANGE, value, orbit))
-            return
-        yield there
-        step = min(LONGEST_STEP, 1.5 * step if there.steps <= EASY else 0.7 * step)
-        # The same orbit through a section anew: on the floor orbits may shrink away from one.
-        if State.of(there.loop.x).y > 0:
-            here = replace(there, loop=replace(there.loop, extent=extent(there.cycle)))
-        else:
-            here = refine(there.p, there.loop.x, there.period, there.loop.restitution)
-            if (here.loop.case, here.loop.fixed) != (there.loop.case, there.loop.fixed):
-                # The section is another: the parameter alone says which way the branch goes on.
-                along = np.append(np.zeros(len(here.loop.free)), along[-1])
-        before.append(here)
-        if here.loop.extent < SMALL * max(each.loop.extent for each in before):
-            # The extent will be zero where a parabola through the last three orbits says.
-            kind, power = (Bifurcation.BIRTH, 1) if here.changes else (Bifurcation.HOPF, 2)
-            last = before[-3:]
-            sizes = np.array([each.loop.extent for each in last]) ** power
-            values = np.array([each.loop.value(name) for each in last])
-            yield Place(kind, float(np.polyfit(sizes, values, len(last) - 1)[-1]), here)
-            return
-    yield Place(Bifurcation.LOST, here.loop.value(name), here, f"not followed beyond {most} orbits")
+                here = refine(there.p, there.loop.x, there.period, there.loop.restitution)
+                if (here.loop.case, here.loop.fixed) != (there.loop.case, there.loop.fixed):
+                    # The section is another: the parameter alone says which way to go on.
+                    along = np.append(np.zeros(len(here.loop.free)), along[-1])
+            before.append(here)
+            if here.loop.extent < SMALL * max(each.loop.extent for each in before):
+                # The extent will be zero where a parabola through the last three orbits says.
+                kind, power = (Bifurcation.BIRTH, 1) if here.changes else (Bifurcation.HOPF, 2)
+                last = before[-3:]
+                sizes = np.array([each.loop.extent for each in last]) ** power
+                values = np.array([each.loop.value(name) for each in last])
+                yield Place(kind, float(np.polyfit(sizes, values, len(last) - 1)[-1]), here)
+                return
+        raise NoOrbitError(f"not followed beyond {most} orbits")
+    except NoOrbitError as error:
+        yield Place(Bifurcation.LOST, here.loop.value(name), here, str(error))
+
+
+def _at_end_of_range(inside: Orbit, outside: Orbit, name: str, span: tuple[float, float]) -> Orbit:
+    """The orbit where the branch leaves the range, between the last within it and the first
+    outside."""
+    start, end = inside.loop.value(name), outside.loop.value(name)
+    value = min(max(end, span[0]), span[1])
+    share = (value - start) / (end - start)
+    x = inside.loop.x + share * (outside.loop.x - inside.loop.x)
+    period = (1 - share) * inside.period + share * outside.period
+    return closed_orbit(replace(inside.loop.with_value(name, value), x=x, period=period))
 
 
 def _next_orbit(here: Orbit, by: Array, name: str, matrix: Array) -> Orbit:
@@ -211,20 +208,18 @@ def _places_between(
     here: Orbit, there: Orbit, step: Array, name: str, matrix: Array
 ) -> Iterator[Place]:
     """Bifurcations between an orbit and the next one on the branch, each located."""
+    first, last = here.multipliers, there.multipliers
+    crosses = np.sum(np.abs(first) > 1) != np.sum(np.abs(last) > 1)
     for kind, sign in _TESTS.items():
-        outside = [np.sum(np.abs(each.multipliers) > 1) for each in (here, there)]
-        if outside[0] == outside[1] or (sign(here.multipliers) > 0) == (
-            sign(there.multipliers) > 0
-        ):
+        if not crosses or (sign(first) > 0) == (sign(last) > 0):
             continue
 
         def sign_at(share: float, sign: Callable[[Any], float] = sign) -> float:
             return sign(_next_orbit(here, share * step, name, matrix).multipliers)
 
         try:
-            orbit = _next_orbit(
-                here, brentq(sign_at, 0.0, 1.0, xtol=SHARP, rtol=SHARP) * step, name, matrix
-            )
+            share = brentq(sign_at, 0.0, 1.0, xtol=SHARP, rtol=SHARP)
+            orbit = _next_orbit(here, share * step, name, matrix)
         except (NoOrbitError, ValueError):
             orbit = there  # where the sequence of cases changes, too, the test may jump
         yield Place(kind, orbit.loop.value(name), orbit)

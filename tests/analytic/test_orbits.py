@@ -76,6 +76,15 @@ def test_a_branch_ends_at_the_range(hop):
     assert np.all(np.diff([orbit.cycle.y.max() for orbit in branch.orbits]) > 0)
 
 
+def test_a_branch_is_lost_where_its_orbit_has_no_other_section(swing, monkeypatch):
+    def fails(*loop):
+        raise NoOrbitError("no section")
+
+    monkeypatch.setattr(orbit_branch, "refine", fails)
+    places = orbit_branch.follow(swing, "omega_0", 1.0, 100.0).places
+    assert {(place.kind, place.reason) for place in places} == {(Bifurcation.LOST, "no section")}
+
+
 @pytest.mark.slow
 def test_hops_that_rebound_end_in_a_torus(hop):
     """Followed in the coefficient of restitution, from where the orbit can be found from that
