@@ -81,6 +81,7 @@ MJ_OPTION = _only(structure("mjOption"), "timestep", "gravity", "cone", "solver"
 MJ_MODEL = _only(
     structure("mjModel"),
     *("nv", "nbody", "njnt", "ngeom", "geom_rbound", "geom_bodyid"),
+    *("body_rootid", "body_mocapid"),
     *("nu", "jnt_type", "jnt_dofadr", "dof_damping", "actuator_biastype", "actuator_trntype"),
     *("actuator_trnid", "actuator_gear", "actuator_biasprm"),
     *("nC", "dof_parentid", "M_rownnz", "M_rowadr", "M_colind"),

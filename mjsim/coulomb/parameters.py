@@ -116,4 +116,4 @@ STUCK = 100.0
 """Load above which a rigid contact isn't pushed out of its depth, in units of a weight: bodies that
 can't part would be pushed for ever, by ever larger forces."""
 BOUNCES = 2.0
-"""Speed of approach that bounces at least, in units of what gravity adds in a step."""
+"""Speed of approach that bounces at least, in units of what the step adds to it without contact."""

@@ -37,14 +37,28 @@ def stiffen(model: Any, data: Any, memory: Any, gravity: float) -> None:
         contact = contacts[i]
         normal, first = rows[contact.address], contact.address
         stuck = estimate[first] * normal.remembered > STUCK * gravity
-        goal = velocity_to_ask_for(model, memory, contact, 0.0 if stuck else h * gravity)
+        fastest = math.inf if is_moved_by_hand(model, contact) else h * gravity
+        goal = velocity_to_ask_for(model, memory, contact, 0.0 if stuck else fastest)
         if memory.bounces:
             fall, share = h * max(-normal.residual, 0.0), restitution_of(memory, contact)
-            goal = max(goal, rebound(share, contact.gap, velocity[first], fall, h, gravity))
+            goal = max(goal, rebound(share, contact.gap, velocity[first], fall, h))
         factor = law.softness * estimate[first] / R[first]
         for r in range(first, first + contact.dim):
             R[r] *= factor
             reference[r] = ((goal if r == first else 0.0) - velocity[r]) / h
+
+
+@kernel
+def is_moved_by_hand(model: Any, contact: Any) -> bool:
+    """Whether a body in contact is a mocap body, or joined to one.
+
+    MuJoCo knows no velocity of these, so that depth is all that tells of it.
+    """
+    bodies = integers(model.geom_bodyid, model.ngeom)
+    mocaps = integers(model.body_mocapid, model.nbody)
+    roots = integers(model.body_rootid, model.nbody)
+    one, other = roots[bodies[contact.geoms[0]]], roots[bodies[contact.geoms[1]]]
+    return bool(max(mocaps[one], mocaps[other]) >= 0)
 
 
 @kernel
@@ -70,14 +84,12 @@ def restitution_of(memory: Any, contact: Any) -> float:
 
 
 @kernel
-def rebound(
-    restitution: float, gap: float, speed: float, fall: float, h: float, gravity: float
-) -> float:
+def rebound(restitution: float, gap: float, speed: float, fall: float, h: float) -> float:
     """Speed after an impact that keeps Newton's share of the energy with which a fall ends, m s-1.
 
     `fall` is what the step adds to the speed. Euler's method keeps v²/2 + gz - hgv/2 in flight.
     """
-    if gap + h * (speed - fall) >= 0 or speed >= -BOUNCES * h * gravity:
+    if gap + h * (speed - fall) >= 0 or speed >= -BOUNCES * fall:
         return -math.inf
     above = max(gap, 0.0)
     energy = speed * (speed - fall) / 2 + fall / h * above

@@ -532,6 +532,21 @@ def test_corners_that_the_collider_takes_by_turns_jolt_nothing(corners):
 
 
 @WAYS
+@pytest.mark.parametrize("speed", [0.1, 0.5])
+def test_mocap_bodies_push(rigid, speed):
+    """Whose velocity MuJoCo doesn't know; rigid contacts let them pass."""
+    pusher = '<body mocap="true" pos="-.1 0 .05"><geom type="box" size=".05 .05 .04"/></body>'
+    model = world(f"{FLOOR}{pusher}<body pos='0 0 .05'><freejoint/>{BOX}</body>")
+    model.geom_friction[:, 0] = 0.3
+    data, law = mujoco.MjData(model), Coulomb(model, rigid=rigid)
+    for _ in range(500):
+        data.mocap_pos[0, 0] += speed * model.opt.timestep
+        law.step(data)
+    assert data.qvel[0] == pytest.approx(speed, rel=1e-2)
+    assert 0.1 - data.qpos[0] + data.mocap_pos[0, 0] < 0.04 * speed
+
+
+@WAYS
 @pytest.mark.parametrize("solver", ["CG", "PGS"])
 def test_what_lands_as_it_slides_is_caught(rigid, solver):
     """By any solver as by Newton's method: PGS let it fall until it was 4 mm deep."""
@@ -638,6 +653,20 @@ def test_restitution_of_each_geom():
         Coulomb(model, rigid=True, restitution=[0.5, 0.5])
     with pytest.raises(ValueError, match=r"restitution\[1\] = 1.5 must be from 0 to 1"):
         Coulomb(model, rigid=True, restitution=[0.0, 1.5, 0.0])
+
+
+@pytest.mark.parametrize("table", [False, True])
+@pytest.mark.parametrize("speed", [1e-3, 0.03, 1.0])
+def test_nothing_is_too_slow_to_bounce_off_what_it_does_not_fall_on(table, speed):
+    """Billiard balls, and such in space: below 4 cm/s one stopped the other half way."""
+    ball = '<geom size=".05" mass="1" condim="1"/>'
+    bodies = "".join(f'<body pos="{x} 0 .05"><freejoint/>{ball}</body>' for x in (0, 0.12))
+    smooth = FLOOR.replace("/>", ' condim="1"/>') if table else ""
+    model = world(smooth + bodies, f'gravity="0 0 {-G * table}"')
+    data = mujoco.MjData(model)
+    data.qvel[0] = speed
+    Coulomb(model, rigid=True, restitution=0.9).step(data, int(0.04 / speed / 2e-3))
+    np.testing.assert_allclose(data.qvel[[0, 6]], [0.05 * speed, 0.95 * speed], rtol=1e-3)
 
 
 def test_steps_that_did_not_come_to_their_share_are_counted():
