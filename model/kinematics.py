@@ -170,11 +170,8 @@ def to_world(x: npt.ArrayLike, theta: npt.ArrayLike, p: Parameters) -> Motion:
     position = np.broadcast_arrays(rho * np.cos(theta), rho * np.sin(theta), p.r + state.y)
     velocity = np.stack([state.v_h, state.v_y, rho * state.omega_c], axis=-1)
     turn = np.swapaxes(frame(theta), -1, -2)
-    return Motion(
-        np.stack(position, axis=-1),
-        _matrix_product(turn, velocity),
-        _matrix_product(turn, angular_velocity(x, p)),
-    )
+    spin = _matrix_product(turn, angular_velocity(x, p))
+    return Motion(np.stack(position, axis=-1), _matrix_product(turn, velocity), spin)
 
 
 def from_world(motion: Motion, p: Parameters) -> tuple[State, Array]:

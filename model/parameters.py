@@ -8,6 +8,7 @@ import math
 import re
 import tomllib
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -83,12 +84,9 @@ def check_number(
 
 def parse_number(name: str, text: str, unit: str, allowed: Range = ANY) -> float:
     """Convert a text to a number; `InputError` if it is none, or as for `check_number`."""
-    try:
+    number: float | str = text
+    with suppress(ValueError):
         number = float(text)
-    except ValueError as error:
-        raise InputError(
-            f"{name} = {text!r} must be a number{f' in {unit}' * (unit != '1')}"
-        ) from error
     return check_number(name, number, unit, allowed)
 
 

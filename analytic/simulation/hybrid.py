@@ -84,13 +84,11 @@ def follow(
         raise InterruptedError("nobody wants the run any more")
     if why == STUCK:
         raise StalledError("steps become too short")
-    fired = (
-        coordinates.ENDS[case][guard]
-        if why == FIRED
-        else A_LANDS
-        if lands and why == DONE
-        else NONE
-    )
+    fired = NONE
+    if why == FIRED:
+        fired = coordinates.ENDS[case][guard]
+    elif lands and why == DONE:
+        fired = A_LANDS
     return fired, _with_nearest_azimuth(coordinates.hybrid_state(now, z, at, k), k, near)
 
 

@@ -186,11 +186,8 @@ def solve(
             before, new = new, _pushed(free, A, B, p)
             change = _change(before, new, p.r)
             # Changes shrink at a steady rate: what is left is this one times the rate.
-            settled = (
-                dt == 0
-                or change <= still
-                or (change < last / 4 and change * change <= last * still / 50)
-            )
+            nearly = change < last / 4 and change * change <= last * still / 50
+            settled = dt == 0 or change <= still or nearly
             converged = settled and residual <= enough
             if converged or not residual <= aim:
                 break
@@ -359,18 +356,12 @@ def _step_to_landing(
         after = _moved(at, time, s, touching, p.R)
         if time == 0:
             break
-        better = (
-            _crossing(at.y, at.u.v_y, after.y, time)
-            if floor
-            else _crossing(at.h, at.u.v_h, after.h, time)
-        )
+        gap, rate, end = (at.y, at.u.v_y, after.y) if floor else (at.h, at.u.v_h, after.h)
+        better = _crossing(gap, rate, end, time)
         if abs(better - time) <= 1e-12 * dt:
             break
-    return (
-        BallState(after.theta, 0.0 if floor else after.y, after.h if floor else 0.0, after.u),
-        s,
-        time,
-    )
+    y, h = (0.0, after.h) if floor else (after.y, 0.0)
+    return BallState(after.theta, y, h, after.u), s, time
 
 
 def step(ball: Ball, dt: float, omega_0: float, p: Constants) -> Ball:
@@ -387,11 +378,8 @@ def step(ball: Ball, dt: float, omega_0: float, p: Constants) -> Ball:
         speed = max(-at.u.v_y if in_A else 0.0, -at.u.v_h if in_B else 0.0)
         if speed > 0:
             hit = _impact(at, dt, in_A, in_B, p)
-            at, P, impact = (
-                BallState(at.theta, at.y, at.h, hit.new),
-                _sum(P, hit.P),
-                _sum(impact, hit.P),
-            )
+            at = BallState(at.theta, at.y, at.h, hit.new)
+            P, impact = _sum(P, hit.P), _sum(impact, hit.P)
             work, residual = work + hit.work, _larger_or_nan(hit.residual, residual)
             landings += speed > LANDED * math.sqrt(p.g * p.R)
             in_A, in_B = in_A and at.u.v_y <= 0, in_B and at.u.v_h <= 0

@@ -88,12 +88,8 @@ def react(guard: int, case: int, at: HybridState, k: System) -> tuple[int, Hybri
         y = 0.0
     else:
         h = 0.0
-    return settle(
-        with_directions(
-            at, State(y, v_y, omega_c, slip_x, slip_y, slip_z, h, v_h), at.alpha, at.beta
-        ),
-        k,
-    )
+    x = State(y, v_y, omega_c, slip_x, slip_y, slip_z, h, v_h)
+    return settle(with_directions(at, x, at.alpha, at.beta), k)
 
 
 def settle(at: HybridState, k: System) -> tuple[int, HybridState, Forces]:
