@@ -42,8 +42,6 @@ class Rolling:
     """rad s-1"""
     shift: float
     """omega_c/omega_0 - 1: 0 without the torque."""
-    rate: float
-    """k, s-1, at which the torque alone would stop the spin."""
     Re: float
     """|w| r^2/nu_f of the spin."""
     friction: float
@@ -73,7 +71,7 @@ def rolling(p: Parameters, layer: bool = True) -> Rolling:
     R omega_c + r omega_0) = c(|w|) R (omega_0 - omega_c): omega_c < omega_0 at first order in the
     torque."""
     if p.omega_0 == 0 or p.c == 0:
-        return Rolling(*(math.nan,) * 5)
+        return Rolling(*(math.nan,) * 4)
     flow, per = abs(p.omega_0), p.R / p.r
 
     def relative_spin(omega_c: Real) -> Real:
@@ -97,9 +95,7 @@ def rolling(p: Parameters, layer: bool = True) -> Rolling:
         floor = np.hypot(p.j * u - s, z_A) / (p.mu * (1 - s))
         wall = np.hypot(s, z_B) / (p.eta * ((1 + p.j) * u - s))
     friction = float(np.nanmin(np.maximum(floor, wall))) if p.mu and p.eta else math.inf
-    return Rolling(
-        math.copysign(1.0, p.omega_0) * omega_c, omega_c / flow - 1, k, float(Re), friction
-    )
+    return Rolling(math.copysign(1.0, p.omega_0) * omega_c, omega_c / flow - 1, float(Re), friction)
 
 
 def model_error(p: Parameters) -> float:
