@@ -31,6 +31,11 @@ def run():
     return mjsim.simulate(P.replace(omega_0=25.0), [0, 0, 13.0, 0, 0, 0], 0.8, sample_interval=0.01)
 
 
+FEW_FRAMES = """const wait = requestAnimationFrame;
+requestAnimationFrame = show => setTimeout(() => wait(show), 300);"""
+"""Each is drawn without a graphics card, in a large part of a second."""
+
+
 def shows(tab, where, text):
     """Wait until a part of a page has this in its text: theory may be compiled before."""
     says = "([w, t]) => document.querySelector(w)?.innerText.includes(t)"
@@ -46,6 +51,7 @@ def test_a_page_plays_in_a_browser_without_network(tab, run, tmp_path, capsys):
     said = told(capsys, f"render {stored} -o {file} --at 0.1 --speed 0.5 --rate 50")
     assert said.endswith(": 71 frames")  # ends of 0.7 s of the run
     assert file.stat().st_size < 3e6
+    tab.add_init_script(FEW_FRAMES)
     tab.goto(file.as_uri())
     tab.wait_for_function("document.querySelector('#place').value > 3")  # it plays by itself
     for k, time in ((0, 0.1), (70, 0.8)):
@@ -153,6 +159,8 @@ def test_what_is_moved_clicked_and_typed_shows_and_is_saved(browser, address, tm
     expect = pytest.importorskip("playwright.sync_api").expect
     expect.set_options(timeout=60_000)  # until theory is compiled
     page, other = (browser.new_page(viewport={"width": 1500, "height": 900}) for _ in range(2))
+    for each in (page, other):
+        each.add_init_script(FEW_FRAMES)
     other.goto(address)
     # A run is saved that is not simulated yet: two files are asked for at once, as soon as there
     # are buttons.
@@ -205,6 +213,7 @@ def test_what_is_moved_clicked_and_typed_shows_and_is_saved(browser, address, tm
 
 def test_a_link_is_a_setting_and_a_telephone_shows_all(browser, address):
     page = browser.new_page(viewport={"width": 390, "height": 844})
+    page.add_init_script(FEW_FRAMES)
     page.goto(f"{address}?omega_0=25&eta=0.25&start=5")
     shows(page, ".said", "SS at ωc = ")
     shows(page, ".about", "Left out are rolling resistance")

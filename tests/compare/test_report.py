@@ -438,7 +438,7 @@ def test_series_and_scales_are_in_the_picture_and_letters_are_shared():
 @pytest.mark.filterwarnings("ignore::ResourceWarning")
 def test_the_league_page_answers(browser, tab, tmp_path, capsys):
     """Values under the pointer, a series switched off, zoom; without scripts the picture."""
-    names = [f"tests.compare.test_runner:{name}" for name in ("EXACT", "ROUGH")]
+    names = [f"tests.exact_engine:{name}" for name in ("EXACT", "ROUGH")]
     told(
         capsys,
         f"league --quick --engine {names[0]} --engine {names[1]} --workers 1 --quiet -o {tmp_path}",
