@@ -1,5 +1,6 @@
 """The commands as tests draw from them: their parsers, what they need, and how they refuse."""
 
+import functools
 import os
 import signal
 import subprocess
@@ -79,5 +80,6 @@ def python(*words: str, **environment: str) -> subprocess.CompletedProcess[str]:
     return done
 
 
+@functools.cache
 def parser_of(command: str) -> options.Parser:
     return parsers.parser([command])._subparsers._group_actions[0].choices[command]

@@ -5,19 +5,12 @@ A function has no more than 75 lines beside the docstring, and six parameters. E
 each with the reason for which it is one; a name that is none any more is to be taken out."""
 
 import ast
+import functools
 from collections import Counter
 from pathlib import Path
 
 LINES, PARAMETERS = 75, 6
 ROOT = Path(__file__).parents[1]
-PACKAGES = {
-    package: {
-        path.relative_to(ROOT): ast.parse(path.read_text("utf-8"))
-        for path in (ROOT / package).rglob("*.py")
-    }
-    for package in ("model", "analytic", "mjsim", "compare")
-}
-"""The modules of each package by their files, parsed."""
 EXCEPTIONS = {
     # doors for users, whose options have names and defaults
     *("analytic/simulation/ensemble.py:simulate_many", "analytic/simulation/simulator.py:simulate"),
@@ -47,9 +40,21 @@ SAME = {
 """Names of which a package may have several."""
 
 
+@functools.cache
+def packages():
+    """The modules of each package by their files, parsed."""
+    return [
+        {
+            path.relative_to(ROOT): ast.parse(path.read_text("utf-8"))
+            for path in (ROOT / package).rglob("*.py")
+        }
+        for package in ("model", "analytic", "mjsim", "compare")
+    ]
+
+
 def test_functions_have_no_more_lines_and_parameters_than_a_reader_keeps_in_mind():
     large = set()
-    for path, tree in (each for trees in PACKAGES.values() for each in trees.items()):
+    for path, tree in (each for trees in packages() for each in trees.items()):
         for node in (each for each in ast.walk(tree) if isinstance(each, ast.FunctionDef)):
             lines = node.end_lineno - node.lineno + 1
             if ast.get_docstring(node):
@@ -64,7 +69,7 @@ def test_functions_have_no_more_lines_and_parameters_than_a_reader_keeps_in_mind
 
 
 def test_names_have_one_meaning_in_a_package():
-    for trees in PACKAGES.values():
+    for trees in packages():
         defined = Counter()
         for tree in trees.values():
             targets = [

@@ -154,13 +154,14 @@ def lines(command: str, rng: np.random.Generator) -> Iterator[list[str]]:
 
 def contents(here: Path) -> dict[str, tuple[int, ...]]:
     """What is there, by name; a file that is written anew is another one."""
-    found = {str(path.relative_to(here)): path.lstat() for path in here.rglob("*")}
-    return {
-        name: (of.st_mode,)
-        if stat.S_ISDIR(of.st_mode)
-        else (of.st_mode, of.st_ino, of.st_size, of.st_mtime_ns)
-        for name, of in found.items()
-    }
+    found = dict[str, tuple[int, ...]]()
+    for folder, folders, files in os.walk(here):
+        for name in (*folders, *files):
+            path = os.path.join(folder, name)  # noqa: PTH118  # paths would take most of the time
+            of = os.lstat(path)
+            kept = () if stat.S_ISDIR(of.st_mode) else (of.st_ino, of.st_size, of.st_mtime_ns)
+            found[os.path.relpath(path, here)] = of.st_mode, *kept
+    return found
 
 
 def outputs_of(words: list[str]) -> set[str]:
