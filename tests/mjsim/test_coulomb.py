@@ -115,6 +115,24 @@ def test_what_is_pushed_off_keeps_its_height_and_stops_in_time(rigid, step, mu, 
     assert abs(error) < 1.1 * step * mu * G / speed
 
 
+@WAYS
+def test_what_slides_and_spins_turns_as_far_as_its_corners_let_it(rigid):
+    """A thin plate, each of whose corners bears a quarter; rigid ones bore it by pairs, at last."""
+    model, data = scene(mu=0.3, geom='<geom type="box" size=".1 .1 .001" mass="1"/>', height=0.001)
+    data.qvel[[0, 5]] = 1, 10
+    Coulomb(model, rigid=rigid).step(data, 300)
+    h, place, velocity = 1e-4, np.zeros(3), np.array([1.0, 0, 10])  # x, y, angle
+    while velocity[2] > 0:
+        turned = np.exp(1j * (place[2] + np.pi / 4 + np.pi / 2 * np.arange(4))) * 0.1 * np.sqrt(2)
+        slip = velocity[0] + 1j * velocity[1] + 1j * velocity[2] * turned
+        force = -0.3 * G / 4 * slip / np.abs(slip)
+        moment = (np.conj(turned) * force).imag.sum()
+        velocity += h * np.array([force.sum().real, force.sum().imag, moment / (0.02 / 3)])
+        place += h * velocity
+    assert 2 * np.arctan2(data.qpos[6], data.qpos[3]) == pytest.approx(place[2], rel=0.03)
+    assert data.qpos[0] == pytest.approx(0.2302, rel=0.03)
+
+
 def test_servo_takes_the_depth_away():
     """A ball that rolls down has the lever r, so that it gains 5/7 g sin(slope): 1 % less without
     servo."""
