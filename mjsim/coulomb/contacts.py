@@ -163,6 +163,8 @@ def find(model: Any, data: Any, memory: Any) -> None:
         contact.velocity[0] = math.inf
         for j in range(5):
             contact.mu[j] = given.friction[j]
+        for j in range(3):
+            contact.pos[j] = given.pos[j]
         for j in range(9):
             contact.frame[j // 3, j % 3] = given.frame[j]
         for side in range(2):

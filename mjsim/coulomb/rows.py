@@ -6,8 +6,7 @@ import math
 from typing import Any
 
 from .compiling import kernel
-from .contacts import same_geoms
-from .engine import reals
+from .engine import integers, reals
 from .memory import SLIDES, STICKS, columns_of, contacts_of, jacobian_of, rows_of
 from .parameters import NARROW
 
@@ -30,7 +29,7 @@ def multiply(memory: Any, accelerations: Any) -> None:
 
 
 @kernel
-def set_up(data: Any, memory: Any) -> None:
+def set_up(model: Any, data: Any, memory: Any) -> None:
     """Read regularisation and reference acceleration of all rows; of soft contacts, friction is
     held."""
     contacts, rows = contacts_of(memory), rows_of(memory)
@@ -39,28 +38,38 @@ def set_up(data: Any, memory: Any) -> None:
         row = rows[r]
         row.R, row.reference, row.held = R[r], reference[r], row.remembered
     if memory.law.rigid:
-        share_loads(memory)
+        share_loads(model, memory)
         return
     for i in range(memory.contacts):
         rows[contacts[i].address].held = 0.0
 
 
 @kernel
-def share_loads(memory: Any) -> None:
-    """Let the points of a face that slides hold loads which lie on a plane, if they are more than
-    three.
+def share_loads(model: Any, memory: Any) -> None:
+    """Let points at which a body slides over another hold loads which lie on a plane, if they are
+    more than three.
 
     What else of their loads there is, no motion tells; errors of predicted slip would pile up.
     """
     contacts, first = contacts_of(memory), 0
     while first < memory.contacts:
         after, slides = first, True
-        while after < memory.contacts and same_geoms(contacts[after].geoms, contacts[first].geoms):
+        while after < memory.contacts and same_face(model, contacts[first], contacts[after]):
             slides = slides and contacts[after].state == SLIDES
             after += 1
         if slides and after > first + 3:
             hold_on_a_plane(memory, first, after)
         first = after
+
+
+@kernel
+def same_face(model: Any, one: Any, other: Any) -> bool:
+    """Whether two contacts are of the same bodies, with the same normal."""
+    bodies, cosine = integers(model.geom_bodyid, model.ngeom), 0.0
+    for j in range(3):
+        cosine += one.frame[0, j] * other.frame[0, j]
+    same = bodies[one.geoms[0]] == bodies[other.geoms[0]]
+    return bool(same and bodies[one.geoms[1]] == bodies[other.geoms[1]] and cosine > 1 - NARROW)
 
 
 @kernel
@@ -92,9 +101,9 @@ def hold_on_a_plane(memory: Any, first: int, after: int) -> None:
 def in_plane(one: Any, other: Any) -> Any:
     """Where a contact is in the tangents of another one, m."""
     x, y = 0.0, 0.0
-    for axis in range(3):
-        way = other.place[0, axis] - one.place[0, axis]
-        x, y = x + one.axes[0, axis, 1] * way, y + one.axes[0, axis, 2] * way
+    for j in range(3):
+        way = other.pos[j] - one.pos[j]
+        x, y = x + one.frame[1, j] * way, y + one.frame[2, j] * way
     return x, y
 
 

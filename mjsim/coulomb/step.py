@@ -127,7 +127,7 @@ def find_references(model: Any, data: Any, memory: Any, gravity: float, since: f
         take_depth_away(model, data, memory)
     if since > 0:
         add_turning(model, data, memory, since)
-    set_up(data, memory)
+    set_up(model, data, memory)
 
 
 @kernel

@@ -115,10 +115,17 @@ def test_what_is_pushed_off_keeps_its_height_and_stops_in_time(rigid, step, mu, 
     assert abs(error) < 1.1 * step * mu * G / speed
 
 
+PLATE = '<geom type="box" size=".1 .1 .001" mass="1"/>'
+FEET = PLATE.replace("/>", ' contype="0" conaffinity="0"/>') + "".join(
+    f'<geom size=".001" mass="0" pos="{x} {y} 0"/>' for x in (-0.1, 0.1) for y in (-0.1, 0.1)
+)
+
+
 @WAYS
-def test_what_slides_and_spins_turns_as_far_as_its_corners_let_it(rigid):
-    """A thin plate, each of whose corners bears a quarter; rigid ones bore it by pairs, at last."""
-    model, data = scene(mu=0.3, geom='<geom type="box" size=".1 .1 .001" mass="1"/>', height=0.001)
+@pytest.mark.parametrize("geom", [PLATE, FEET], ids=["plate", "feet"])
+def test_what_slides_and_spins_turns_as_far_as_its_corners_let_it(rigid, geom):
+    """Each bears a quarter of its weight; of rigid ones at last two bore it all."""
+    model, data = scene(mu=0.3, geom=geom, height=0.001)
     data.qvel[[0, 5]] = 1, 10
     Coulomb(model, rigid=rigid).step(data, 300)
     h, place, velocity = 1e-4, np.zeros(3), np.array([1.0, 0, 10])  # x, y, angle
