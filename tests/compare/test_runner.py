@@ -202,6 +202,7 @@ def loaded():
 
 
 def test_an_engine_on_the_exact_cases_beside_tests_of_ones_own(pytester):
+    pytester.makeini("[pytest]")  # names are told from here, whatever lies in directories above
     pytester.makepyfile(adapter=ADAPTER, test_mine=FIXTURES)
     known = pytester.makefile(".txt", known="# ours\ncylinder   it has no wall\nblock-rests\n")
     given = f"test_mine.py --dualball-engine adapter --dualball-known {known} -rx -n 1"
