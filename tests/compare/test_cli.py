@@ -106,8 +106,7 @@ def test_a_run_is_described_as_it_is_stored_whole_and_in_parts(tmp_path, monkeyp
     assert about["complete"]
     assert len(about["cases"]) > 1
     assert about["last"]["omega_c"] == kept.omega_c[-1]
-    assert "omega_0 = 25" in told(capsys, f"inspect {run} --plot {tmp_path / 'run.png'}")
-    assert (tmp_path / "run.png").stat().st_size > 10_000
+    assert "omega_0 = 25" in told(capsys, f"inspect {run}")
     monkeypatch.setattr("compare.view.motions.PART", 7)
     assert told(capsys, f"inspect {run} --json") == printed
 
