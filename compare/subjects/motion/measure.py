@@ -422,8 +422,10 @@ def _ends(piece: StepPairResult) -> tuple[list[float], ...]:
 
 
 def changes(run: Trajectory) -> bool:
-    """Whether the case changes in a run: forces then lag behind, and steps may by chance agree."""
-    return bool(np.ptp(run.case))
+    """Whether the case changes in a run, or the ball leaves at once the floor on which it begins:
+    forces then lag behind, and steps may by chance agree."""
+    leaves = run.y[0] == 0 and Case(int(run.case[0])).A is Contact.N
+    return bool(np.ptp(run.case) or leaves)
 
 
 def closes(run: Trajectory) -> bool:

@@ -15,7 +15,8 @@
   of drag than Stokes' makes it a cubic.
 * `lift` (the dotted arrows of Fig. 6): states of a case differ only in omega_c, from slow, where
   the floor presses, to fast. A few show roughly where it stops pressing; at slower ones its force
-  is measured and extrapolated to zero as a function of omega_c^2."""
+  is measured and extrapolated to zero as a function of omega_c^2. Out of rolling at both points,
+  where floor and wall share the load in any way, that place is bracketed instead."""
 
 from __future__ import annotations
 
@@ -27,6 +28,7 @@ from typing import Unpack
 
 import numpy as np
 
+from compare.kit.brackets import Attempt, Bracket, Search, narrow
 from compare.kit.conditions import Conditions, state_of
 from compare.kit.programme import Protocol
 from compare.kit.record import Measured, Measurement, Missing, Records, Sets, if_found
@@ -550,8 +552,12 @@ def lift(runner: Runner, sets: Sets, records: Records) -> Measured:
         for arrow, got in zip(arrows, first, strict=True)
     ]
     nearer = [arrow.tasks_near_onset(runs) for arrow, runs in zip(arrows, kept, strict=True)]
-    rows = zip(arrows, orbits, first, kept, nearer, runner.groups(nearer), strict=True)
-    for arrow, tasks, got, runs, later, near in rows:
+    searches = [arrow.search(runs) for arrow, runs in zip(arrows, kept, strict=True)]
+    careful = not runner.sampling.granted
+    brackets = iter(narrow(runner, [search for search in searches if search], careful))
+    found = [next(brackets) if search else None for search in searches]
+    rows = zip(arrows, orbits, first, kept, found, nearer, runner.groups(nearer), strict=True)
+    for arrow, tasks, got, runs, bracket, later, near in rows:
         leaves = next((Case(int(run.case[-1])) for run in runs if _force(run) is None), None)
         if not runs:
             strays = "the ball doesn't stay in it at any orbit"
@@ -567,6 +573,15 @@ def lift(runner: Runner, sets: Sets, records: Records) -> Measured:
         elif leaves is not arrow.outer:
             why = f"a ball that leaves the floor out of {arrow.inner.name} ends in {leaves.name}"
             yield runner.missing(arrow.set, why)
+        elif bracket:
+            last = [run for run in bracket.runs[:1] if run]
+            if bracket.failure or not arrow.staying(last):
+                slips = "the ball slips before it leaves the floor"
+                why = f"the run {bracket.failure}" if bracket.failure else slips
+                yield runner.missing(arrow.set, f"out of {arrow.inner.name}: {why}")
+            else:
+                place, unit = bracket.place, 1 / time_unit(arrow.p)
+                yield arrow.row("lift_onset", unit, place, bracket.tasks)
         elif isinstance(near, str) or (onset := _onset(near)) is None:
             chatters = "the contact at the floor opens and closes"
             why = f"the run {near}" if isinstance(near, str) else chatters
@@ -608,9 +623,26 @@ class Arrow:
         first = [*strays, False].index(False)
         return runs[first : [*strays, True].index(True, first)]
 
+    def search(self, kept: Sequence[Trajectory]) -> Search | None:
+        """A search for the orbit at which the ball leaves the floor out of RR, between the fastest
+        of its orbits at which it presses and the next; None where there are no such two."""
+        presses = [_force(run) is not None for run in kept]
+        if self.inner is not Case.RR or all(presses) or not presses[0]:
+            return None
+        k, orbits = presses.index(False), [float(run.omega_c[0]) for run in kept]
+
+        def task(omega_c: float, bracket: Bracket, attempt: Attempt) -> Task:
+            return self.task(omega_c, attempt.divisor)
+
+        width = self.runner.sampling.thresholds_width * orbits[k]
+        around = Bracket(orbits[k - 1], orbits[k])
+        return Search(around, task, lambda run: _force(run) is not None, width)
+
     def tasks_near_onset(self, kept: Sequence[Trajectory]) -> list[Task]:
         """Tasks just below the orbit at which the ball lifts off by a line through the last two
         forces of the floor; at the fastest orbit where it stays on the floor at all."""
+        if self.inner is Case.RR:
+            return []
         pressed = [(run.omega_c[0] ** 2, force.value) for run in kept if (force := _force(run))]
         if kept and len(pressed) == len(kept):
             fastest = float(kept[-1].omega_c[0])

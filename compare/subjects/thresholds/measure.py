@@ -48,6 +48,9 @@ from model.arrays import Array
 SLIPPING_SPEED = 3e-8
 """Slip speed, divided by sqrt(g R), that counts as slip: contacts are solved to 1e-12, and a ball
 whose friction falls short by a millionth reaches it within a run."""
+SEEN = 1e-6
+"""That millionth: relative distance from its threshold from which on slip is seen. (It limits what
+a threshold is known to since one of the default level had been seen 1e-6 too high.)"""
 LAGS = 1e-3
 """Relative lag behind the fluid from which on a ball that has slipped may have to slip again."""
 CREEPS = 100.0
@@ -290,7 +293,8 @@ class Findings:
         # distance.
         _, above = of.runs
         speed = max(slip(speeds, above) for speeds in sliding_speeds(above)) if above else 0.0
-        unseen = of.width / max(1.0, speed) if quantity in ("omega_01", "omega_02") else 0.0
+        unseen = max(of.width / max(1.0, speed), SEEN * of.high)
+        unseen = unseen if quantity in ("omega_01", "omega_02") else 0.0
         return self.row(quantity, of.place.also(unseen_slip=unseen), of.tasks, side=side, by=by)
 
     def rows_of_zero(self, kind: Beside, what: str, quantity: str, side: str, by: str) -> Measured:
@@ -514,8 +518,8 @@ def _rows_of_slipping(each: Findings) -> Measured:
     said: dict[float, bool | None] = {
         flow: case is Case.SS for flow, case in each.cases[Passage.SS_ENDS].items()
     }
-    if tried := each.brackets.get(Passage.SS_ENDS):
-        said |= dict(tried.said)
+    if tried := each.brackets.get(Passage.SS_ENDS):  # next to its end a ball settles too slowly
+        said |= {tried.low: True, tried.high: False}
     ends = sum(bool(said[slow]) and said[fast] is False for slow, fast in pairwise(sorted(said)))
     settles = len(tasks) >= POINTS
     # Beside known flows only a ball may have settled at none beyond the last.
