@@ -74,9 +74,9 @@ def copy(source: int, target: int, count: int) -> None:
 
 @kernel
 def store_poses(model: Any, data: Any, memory: Any) -> None:
-    """Store where geoms and contacts are, on which axes and Jacobians depend."""
-    copy(data.geom_xpos, memory.xpos_at, 3 * model.ngeom)
-    copy(data.geom_xmat, memory.xmat_at, 9 * model.ngeom)
+    """Store where bodies and contacts are, on which axes and Jacobians depend."""
+    copy(data.xpos, memory.xpos_at, 3 * model.nbody)
+    copy(data.xmat, memory.xmat_at, 9 * model.nbody)
     copy(data.contact, memory.pose_at, data.ncon * WORDS)
 
 
@@ -91,13 +91,13 @@ def stayed(one: Any, other: Any) -> bool:
 
 @kernel
 def nothing_moved(model: Any, data: Any, memory: Any) -> bool:
-    """Whether geoms and contacts are where they were when their poses were stored."""
+    """Whether bodies and contacts are where they were when their poses were stored."""
     if memory.ncon != data.ncon or memory.rows != data.nefc or memory.dry != data.nf:
         return False
-    places, axes = 3 * model.ngeom, 9 * model.ngeom
-    if not stayed(reals(data.geom_xpos, places), reals(memory.xpos_at, places)):
+    places, axes = 3 * model.nbody, 9 * model.nbody
+    if not stayed(reals(data.xpos, places), reals(memory.xpos_at, places)):
         return False
-    if not stayed(reals(data.geom_xmat, axes), reals(memory.xmat_at, axes)):
+    if not stayed(reals(data.xmat, axes), reals(memory.xmat_at, axes)):
         return False
     found = engine_contacts(data.contact, data.ncon)
     poses = engine_contacts(memory.pose_at, data.ncon)

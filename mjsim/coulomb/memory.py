@@ -261,8 +261,8 @@ class Simulation:
         for name in ("residual", "tried", "step", "local"):
             self._own(name, np.zeros(nv))
         self._own("matrix", np.zeros((nv, nv)))
-        self._own("xpos", np.zeros((model.ngeom, 3)))
-        self._own("xmat", np.zeros((model.ngeom, 9)))
+        self._own("xpos", np.zeros((model.nbody, 3)))
+        self._own("xmat", np.zeros((model.nbody, 9)))
         self.make_room(16, 64, 64 * min(model.nv, 16))
         self.active, self.dampers = record["active"], record["dampers"]
         self.data: Callable[[], Any] = lambda: None

@@ -703,3 +703,25 @@ def test_steps_that_did_not_come_to_their_share_are_counted():
         data.qvel[:] = 1.0
         law.step(data, 500)
     assert usual.unsolved == 0 < strict.unsolved
+
+
+@WAYS
+def test_tendons_move_beside_what_rests(rigid):
+    """A body without geoms swings on a tendon with dry friction while a box lies there: the
+    tendon's Jacobian is that of each step, as it is with a geom on the body."""
+    found = []
+    for geom in ("", '<geom size=".001" mass="0" contype="0" conaffinity="0"/>'):
+        model = mujoco.MjModel.from_xml_string(f"""<mujoco><worldbody>
+            <geom type="plane" size="0 0 1"/>
+            <body pos="0 0 .1"><freejoint/><geom type="box" size=".1 .1 .1" mass="1"/></body>
+            <body pos="0 1 1"><joint type="hinge" axis="0 1 0"/>{geom}
+              <inertial pos=".2 0 0" mass=".2" diaginertia="1e-3 1e-3 1e-3"/>
+              <site name="s" pos=".2 0 0"/></body>
+            <site name="s2" pos="0 1 1.3"/></worldbody>
+            <tendon><spatial frictionloss="1"><site site="s"/><site site="s2"/></spatial></tendon>
+            </mujoco>""")
+        data = mujoco.MjData(model)
+        Coulomb(model, rigid=rigid).step(data, 500)
+        found.append(float(data.qpos[-1]))
+    assert abs(found[1]) > 0.1
+    assert found[0] == pytest.approx(found[1], abs=1e-9)
