@@ -518,8 +518,8 @@ def _rows_of_slipping(each: Findings) -> Measured:
     said: dict[float, bool | None] = {
         flow: case is Case.SS for flow, case in each.cases[Passage.SS_ENDS].items()
     }
-    if tried := each.brackets.get(Passage.SS_ENDS):  # next to its end a ball settles too slowly
-        said |= {tried.low: True, tried.high: False}
+    if tried := each.brackets.get(Passage.SS_ENDS):  # between its ends a ball settles too slowly
+        said |= {flow: answer for flow, answer in tried.said if flow in tried.ends}
     ends = sum(bool(said[slow]) and said[fast] is False for slow, fast in pairwise(sorted(said)))
     settles = len(tasks) >= POINTS
     # Beside known flows only a ball may have settled at none beyond the last.
