@@ -18,7 +18,6 @@ from compare.kit.scales import dragged_speed
 from compare.kit.statistics import COVERAGE, Estimate, estimate, steady_mean
 from compare.kit.step_pairs import Start
 from compare.kit.tasks import Task
-from mjsim.mid_step import BallConstants, resistance
 from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
 from model.drag import STOKES
@@ -183,20 +182,7 @@ def _judge_window(
     elif max(excess, solving) > loose:
         way = "drifts" if max(drifting, solving) > loose else "swings"
         failure = f"{case.name} still {way}, {max(excess, solving):.2g} times the limit"
-    elif _is_taken_along(p, mean["omega_c"], task.t_end):
-        excess, failure = math.inf, f"{case.name} is taken along by the fluid, ever more slowly"
     return SteadyState(start, case, values, means[len(series) :], task, excess, failure)
-
-
-def _is_taken_along(p: Parameters, omega_c: float, lasts: float) -> bool:
-    """Whether a ball lags by more than shows, where drag takes longer to end that than a run lasts,
-    s: it falls with the square of the lag by some laws, and then no drift is seen.
-
-    (Added after a ball had been seen to stay behind by a millionth.)"""
-    speed = abs(omega_c - p.omega_0) * p.R
-    c = float(resistance(speed, 0.0, 0.0, BallConstants.of(p))) / p.m
-    least = quantity("omega_c").resolution * quantity("omega_c").size(p) * p.R
-    return p.drag != STOKES and speed > least and c * lasts < 1
 
 
 def _determined(case: Case) -> list[list[str]]:

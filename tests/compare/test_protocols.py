@@ -654,3 +654,32 @@ def test_a_swing_is_measured_although_loads_are_rough() -> None:
     assert period == pytest.approx(0.33, rel=3e-4)
     assert mean == pytest.approx(22.4, rel=1e-9)
     assert size == pytest.approx(0.1, rel=5e-3)
+
+
+def test_a_ball_leaves_the_floor_where_it_does_however_it_shared_its_load(runner):
+    """On this set the load on the floor has a kink just before it is gone: continued as it was, it
+    would be gone 2 % earlier."""
+    p = sets(Level.DEFAULT)["design-9"]
+    rows = [each for each in slipping.lift(runner, {"d": p}, Records()) if each.set == "d"]
+    (onset,) = (
+        each
+        for each in rows
+        if not isinstance(each, Missing)
+        and (each.quantity, each.at.get("inner")) == ("lift_onset", "RR")
+    )
+    assert onset.value == pytest.approx(14.68884, abs=3 * onset.uncertainty)
+    assert onset.uncertainty < 1e-4 * onset.value
+
+
+def test_nor_has_it_in_a_flow_the_other_way_round(runner):
+    found = Records.of(settled.mirrored(runner, {"blunt": QUICK["blunt"]}, Records()))
+    values = {(m.at["start"], m.quantity) for m in found.measurements}
+    assert ("rest", "omega_c") in values
+    assert ("on the wall", "omega_c") not in values
+    assert any("quadratic drag fades with the lag" in each.reason for each in found.missing)
+
+
+@pytest.mark.parametrize("order", [0.7, 1.0, 2.0])
+def test_the_limit_of_hops_is_sure_whatever_the_order(order):
+    limit = attractors.of_hops(1 + 2.0**order, Estimate(2.0, 0.0))
+    assert limit.value == pytest.approx(1.0, abs=3 * limit.uncertainty)

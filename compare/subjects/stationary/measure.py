@@ -116,9 +116,12 @@ def mirrored(runner: Runner, sets: Sets, records: Records) -> Measured:
     for state in settling.settle(runner, starts):
         if state.failure:
             yield _unsettled(runner, state, 1 + len(state.values))
+            continue
+        yield _row(runner, state, "case", state.case)
+        if why := _why_drag_fades(state):
+            yield _unsettled(runner, replace(state, failure=why), len(state.values))
         else:
             settled.append(state)
-            yield _row(runner, state, "case", state.case)
     for state, fine in zip(settled, settling.settle_finer(runner, settled), strict=True):
         yield from _values(runner, [state], fine)
 
