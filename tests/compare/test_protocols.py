@@ -586,8 +586,8 @@ def test_an_end_that_cannot_be_extrapolated_is_missing_and_no_finding(runner, mo
     runner = replace(runner, protocol="thresholds")
     records = Records.of(thresholds.measure(runner, {"thick-fluid": p}, Records(tuple(rows))))
     assert any("points to no flow at which it ends" in each.reason for each in records.missing)
-    # An end is seen, and no smooth one.
-    assert [m.value for m in records.select("thresholds", "folds")] == [1.0]
+    # An end is seen, but not whether it is a fold.
+    assert not records.select("thresholds", "folds")
 
 
 def run_of(time, y, theta):
@@ -679,7 +679,8 @@ def test_nor_has_it_in_a_flow_the_other_way_round(runner):
     assert any("quadratic drag fades with the lag" in each.reason for each in found.missing)
 
 
-@pytest.mark.parametrize("order", [0.7, 1.0, 2.0])
-def test_the_limit_of_hops_is_sure_whatever_the_order(order):
-    limit = attractors.of_hops(1 + 2.0**order, Estimate(2.0, 0.0))
-    assert limit.value == pytest.approx(1.0, abs=3 * limit.uncertainty)
+@pytest.mark.parametrize("coarse", [3.0, 2.5, 0.5])
+def test_what_hops_show_is_sure_however_their_errors_fall(coarse):
+    """By the first order, by less, or to the other side."""
+    shown = attractors.of_hops(coarse, Estimate(2.0, 0.0))
+    assert shown.value == pytest.approx(1.0, abs=COVERAGE * shown.uncertainty)

@@ -32,7 +32,7 @@ from compare.kit.record import Measured, Records, Sets, if_found
 from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.settling import settled_readings
-from compare.kit.statistics import Estimate, estimate, hops, peaks, settled_case, tail, top, uniform
+from compare.kit.statistics import Estimate, estimate, hops, peaks, settled_case, tail, top
 from compare.kit.step_pairs import Start, StepPair, carry_out, constrained, of_no_step
 from compare.kit.sweep import sobol
 from compare.kit.tasks import Task
@@ -121,14 +121,12 @@ def _hopping(runner: Runner, shares: Sequence[float], divisors: tuple[int, int])
 
 
 def of_hops(coarse: float, fine: Estimate) -> Estimate:
-    """The limit of a vanishing step of what hops show, from the values with a step and with half of
-    it.
+    """What hops show, from the values with a step and with half of it.
 
-    Balls land at any part of a step, so that errors are of first order in the mean, and may fall by
-    less: the limit lies anywhere within twice the difference. (It was sought within one of it,
-    until an orbit of the default level had been seen 3.2 uncertainties off.)"""
-    change = fine.value - coarse
-    return replace(fine, value=fine.value + change).also(time_step=uniform(abs(change)))
+    Balls land at any part of a step, so that errors are of first order in the mean, and of no clear
+    order beside it: the value with half the step is as uncertain as the difference. (A limit was
+    sought beyond it, until orbits of the default level had been seen 3.2 uncertainties off.)"""
+    return fine.also(time_step=abs(fine.value - coarse))
 
 
 def with_groups(p: Parameters, kappa: float, Omega_0: float, **others: float) -> Parameters:

@@ -523,14 +523,15 @@ def _rows_of_slipping(each: Findings) -> Measured:
     ends = sum(bool(said[slow]) and said[fast] is False for slow, fast in pairwise(sorted(said)))
     settles = len(tasks) >= POINTS
     # Beside known flows only a ball may have settled at none beyond the last.
-    if settles and (ends or not each.runner.sampling.granted):
+    told = settles and (smooth or top is not None)
+    if told and (ends or not each.runner.sampling.granted):
         yield each.row("folds", float(ends - smooth), tasks)
     if smooth:
         by = "floor force of settled slipping"
         yield from each.rows_of_zero(Beside.SS_LAST, "force_Ay", "omega_02", "from below", by)
     elif top is None:
         why = "settled slipping points to no flow at which it ends"
-        yield each.missing(why, 2 if settles else 3)
+        yield each.missing(why, 3)
     else:
         by = "maximum of omega_0 along the branch"
         yield each.row("omega_04", top, tasks, side="from below", by=by)
