@@ -587,7 +587,7 @@ def test_an_end_that_cannot_be_extrapolated_is_missing_and_no_finding(runner, mo
     records = Records.of(thresholds.measure(runner, {"thick-fluid": p}, Records(tuple(rows))))
     assert any("points to no flow at which it ends" in each.reason for each in records.missing)
     # An end is seen, but not whether it is a fold.
-    assert not records.select("thresholds", "folds")
+    assert [*records.select("thresholds", "folds")] == []
 
 
 def run_of(time, y, theta):
