@@ -48,7 +48,7 @@ from model.arrays import Array
 SLIPPING_SPEED = 3e-8
 """Slip speed, divided by sqrt(g R), that counts as slip: contacts are solved to 1e-12, and a ball
 whose friction falls short by a millionth reaches it within a run."""
-SEEN = 1e-6
+SLIP_SEEN = 1e-6
 """That millionth: relative distance from its threshold from which on slip is seen. (It limits what
 a threshold is known to since one of the default level had been seen 1e-6 too high.)"""
 LAGS = 1e-3
@@ -293,7 +293,7 @@ class Findings:
         # distance.
         _, above = of.runs
         speed = max(slip(speeds, above) for speeds in sliding_speeds(above)) if above else 0.0
-        unseen = max(of.width / max(1.0, speed), SEEN * of.high)
+        unseen = max(of.width / max(1.0, speed), SLIP_SEEN * of.high)
         unseen = unseen if quantity in ("omega_01", "omega_02") else 0.0
         return self.row(quantity, of.place.also(unseen_slip=unseen), of.tasks, side=side, by=by)
 
