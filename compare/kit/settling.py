@@ -12,9 +12,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from compare.kit.quantities import quantity
-from compare.kit.record import Measured, Records
+from compare.kit.record import Measured, Measurement, Records
 from compare.kit.runner import Runner, coarse_step
-from compare.kit.scales import dragged_speed
+from compare.kit.scales import dragged_speed, rotation_scale
 from compare.kit.statistics import COVERAGE, Estimate, estimate, steady_mean
 from compare.kit.step_pairs import Start
 from compare.kit.tasks import Task
@@ -41,6 +41,9 @@ SOLVED = 2e-11
 """Relative accuracy to which contact forces are solved in a step; errors of one sign add up for a
 time 1/c. (Twenty times what it was before settled states of rigid contacts had been seen, which
 creep by as much.)"""
+STATE_KNOWN = 1e-5
+"""Relative uncertainty of omega_c up to which a state is known well enough for others to be
+measured from it. (Chosen after states off by 1.4e-4 had been at the default level.)"""
 FORCES = tuple(f"force_{contact}{axis}" for contact in "AB" for axis in "xyz")
 SUMS = ("force_Az", "force_Bz", "force_Ax-By", "force_Ay+By", "force_Bx+By")
 """What mechanics determine of the forces in RR: the rest is a family of one parameter."""
@@ -300,6 +303,11 @@ def forces(A: Array, B: Array) -> dict[str, Array]:
 def physical_case(case: Case) -> Case:
     """SR with an unloaded floor and NR at y = 0 are one physical state: both count as NR."""
     return Case.NR if case is Case.SR else case
+
+
+def is_well_known(omega_c: Measurement) -> bool:
+    """Whether a settled state is known well enough for others to be measured from it."""
+    return omega_c.uncertainty <= STATE_KNOWN * rotation_scale(omega_c.parameters)
 
 
 def settled_cases(records: Records, set: str, how: str) -> dict[float, Case]:

@@ -93,6 +93,8 @@ def _curves(name: str, p: Parameters, records: Records, most: int) -> Iterator[C
             at[m.quantity] = m
     for case in (Case.RR, Case.SS, Case.NR):
         alike = sorted(states[case].items())
+        if case is Case.SS:  # half the step may show that they are known too vaguely
+            alike = [each for each in alike if settling.is_well_known(each[1]["omega_c"])]
         few = np.linspace(0, len(alike) - 1, most).round() if case is Case.SS else [len(alike) - 1]
         for k in sorted({int(n) for n in few if alike}):
             omega_0, values = alike[k]

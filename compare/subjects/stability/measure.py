@@ -33,8 +33,8 @@ from compare.kit.programme import Protocol
 from compare.kit.quantities import quantity
 from compare.kit.record import Found, Measured, Measurement, Missing, Records, Sets
 from compare.kit.runner import Runner, coarse_step
-from compare.kit.scales import rotation_scale, time_unit
-from compare.kit.settling import SOLVED, SPIN, physical_case, safe_height
+from compare.kit.scales import time_unit
+from compare.kit.settling import SOLVED, SPIN, is_well_known, physical_case, safe_height
 from compare.kit.statistics import (
     COVERAGE,
     Estimate,
@@ -62,9 +62,6 @@ SLIGHT_PUSH = 2e-6
 """The same under other laws: in proportion to a lag only far below Re = 1."""
 SLOWEST_SLIP = 0.04
 """Least slip speed of a state divided by sqrt(g R): a push is to be small beside it."""
-STATE_KNOWN = 1e-5
-"""Relative uncertainty of omega_c up to which a state is known well enough to be pushed: rates are
-those of the state. (Chosen after a state off by 1.4e-4 had been pushed at the default level.)"""
 ZERO_RATE = 0.05
 """Measured rates below this share of the drag coefficient c count as zero."""
 
@@ -225,7 +222,7 @@ def chosen_states(
     chosen = [Pushed(runner, Start(name, p.replace(omega_0=0.0), "spinning", spinning), Case.RS)]
     values: dict[tuple[Parameters, Case], dict[str, float]] = {}
     for m in records.select("settled", where=lambda m: m.set == name and m.quantity in VARIABLES):
-        if m.quantity != "omega_c" or m.uncertainty <= STATE_KNOWN * rotation_scale(m.parameters):
+        if m.quantity != "omega_c" or is_well_known(m):
             values.setdefault((m.parameters, physical_case(m.case)), {})[m.quantity] = m.value
     values = {state: value for state, value in values.items() if "omega_c" in value}
     states = []
