@@ -24,6 +24,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
+
 from compare.kit.lock import Lock
 from compare.kit.progress import Show, show_nothing
 from compare.kit.tasks import Task, carry_out, deadline, failed_path, store
@@ -173,16 +175,24 @@ class Campaign:
     def _keep_in_memory(self, runs: Mapping[str, Trajectory]) -> None:
         """Keep runs in memory, and forget the earliest while there are more than `READ` samples.
 
-        What isn't stored is before it is forgotten, all at once."""
+        What isn't stored is before it is forgotten, all of it, in files as long as a batch: runs
+        that are looked at in another order would have longer ones read again and again."""
         others = [key for key in self._read if key not in runs]
         self._read = {key: self._read[key] for key in others} | dict(runs)
         samples = sum(len(run.time) for run in self._read.values())
         while samples > READ and others:
             first = others.pop(0)
             if first not in self._files:
-                loose = {key: run for key, run in self._read.items() if key not in self._files}
-                self._files |= dict.fromkeys(loose, self._storing.store(loose))
+                self._store({key: run for key, run in self._read.items() if key not in self._files})
             samples -= len(self._read.pop(first).time)
+
+    def _store(self, runs: dict[str, Trajectory]) -> None:
+        """Store runs in files of at most `HELD` samples, or of one run that has more."""
+        while runs:
+            ends = np.cumsum([len(run.time) for run in runs.values()])
+            some = [*runs][: max(1, int(np.searchsorted(ends, HELD, "right")))]
+            file = self._storing.store({key: runs.pop(key) for key in some})
+            self._files |= dict.fromkeys(some, file)
 
     @property
     def _storing(self) -> Storing:
