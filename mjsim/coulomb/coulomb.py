@@ -41,7 +41,8 @@ class Coulomb:
     model : any `mujoco.MjModel`, of MuJoCo 3.3.6 or later; condim 1, 3, 4 and 6. Coulomb's law
         has no pyramid: the cone is elliptic while the law acts, and then again what it was. So give
         a model whose forces you read by `mj_contactForce` the elliptic cone, or read them in
-        `acting`: MuJoCo would take the rows for a pyramid's
+        `acting`: MuJoCo would take the rows for a pyramid's. Newton's method stands in for the
+        solver PGS as long
     rigid : False: MuJoCo's own contacts, whose depth, bounce and damping `solref` and `solimp` say.
         True: Moreau and Jean's time stepping, in which contacts have no depth to speak of and land
         within one step. Geoms get a `margin` in which contacts are seen ahead, but bear nothing: at
@@ -64,8 +65,8 @@ class Coulomb:
 
     Each `MjData` has a memory of its own. It takes part in the state of the simulation, so save and
     restore both. Contacts of flexes are left as they are; so is all in a soft simulation in which
-    nothing touches. A copy, also by pickle, has the memory of the only `MjData` that there was; of
-    several none.
+    nothing touches, but for the solver PGS. A copy, also by pickle, has the memory of the only
+    `MjData` that there was; of several none.
 
     Raises
     ------

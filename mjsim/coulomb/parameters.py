@@ -73,6 +73,8 @@ STILL = 1e-9
 """Most that contacts and bodies may move, m or rad, for their Jacobians to stay as they are."""
 FLUSH = 1e-3
 """Part of how far points of contact move that counts there: those of flush faces shift by µm."""
+ALIGNED = 1e-3
+"""By how much the cosine of the angle between normals of one face is less than 1, at most."""
 NARROW = 1e-3
 """Square of the width of a face, in units of its length, below which its points lie on a line."""
 APART = 1e9

@@ -6,9 +6,8 @@ import math
 from typing import Any
 
 from .compiling import kernel
-from .engine import integers, reals
-from .memory import SLIDES, STICKS, columns_of, contacts_of, jacobian_of, rows_of
-from .parameters import NARROW
+from .engine import reals
+from .memory import STICKS, columns_of, contacts_of, jacobian_of, rows_of
 
 
 @kernel
@@ -29,7 +28,7 @@ def multiply(memory: Any, accelerations: Any) -> None:
 
 
 @kernel
-def set_up(model: Any, data: Any, memory: Any) -> None:
+def set_up(data: Any, memory: Any) -> None:
     """Read regularisation and reference acceleration of all rows; of soft contacts, friction is
     held."""
     contacts, rows = contacts_of(memory), rows_of(memory)
@@ -37,74 +36,9 @@ def set_up(model: Any, data: Any, memory: Any) -> None:
     for r in range(len(rows)):
         row = rows[r]
         row.R, row.reference, row.held = R[r], reference[r], row.remembered
-    if memory.law.rigid:
-        share_loads(model, memory)
-        return
-    for i in range(memory.contacts):
-        rows[contacts[i].address].held = 0.0
-
-
-@kernel
-def share_loads(model: Any, memory: Any) -> None:
-    """Let points at which a body slides over another hold loads which lie on a plane, if they are
-    more than three.
-
-    What else of their loads there is, no motion tells; errors of predicted slip would pile up.
-    """
-    contacts, first = contacts_of(memory), 0
-    while first < memory.contacts:
-        after, slides = first, True
-        while after < memory.contacts and same_face(model, contacts[first], contacts[after]):
-            slides = slides and contacts[after].state == SLIDES
-            after += 1
-        if slides and after > first + 3:
-            hold_on_a_plane(memory, first, after)
-        first = after
-
-
-@kernel
-def same_face(model: Any, one: Any, other: Any) -> bool:
-    """Whether two contacts are of the same bodies, with the same normal."""
-    bodies, cosine = integers(model.geom_bodyid, model.ngeom), 0.0
-    for j in range(3):
-        cosine += one.frame[0, j] * other.frame[0, j]
-    same = bodies[one.geoms[0]] == bodies[other.geoms[0]]
-    return bool(same and bodies[one.geoms[1]] == bodies[other.geoms[1]] and cosine > 1 - NARROW)
-
-
-@kernel
-def hold_on_a_plane(memory: Any, first: int, after: int) -> None:
-    """Hold the loads a + b x + c y that are nearest to those of contacts, places from their
-    middle."""
-    contacts, rows, count = contacts_of(memory), rows_of(memory), after - first
-    middle_x, middle_y, a = 0.0, 0.0, 0.0
-    for i in range(first, after):
-        x, y = in_plane(contacts[first], contacts[i])
-        middle_x, middle_y = middle_x + x / count, middle_y + y / count
-        a += rows[contacts[i].address].remembered / count
-    xx, xy, yy, load_x, load_y = 0.0, 0.0, 0.0, 0.0, 0.0
-    for i in range(first, after):
-        x, y = in_plane(contacts[first], contacts[i])
-        x, y, load = x - middle_x, y - middle_y, rows[contacts[i].address].remembered
-        xx, xy, yy = xx + x * x, xy + x * y, yy + y * y
-        load_x, load_y = load_x + load * x, load_y + load * y
-    area = xx * yy - xy * xy
-    if area <= NARROW * (xx + yy) ** 2:  # they lie on a line
-        return
-    b, c = (load_x * yy - load_y * xy) / area, (load_y * xx - load_x * xy) / area
-    for i in range(first, after):
-        x, y = in_plane(contacts[first], contacts[i])
-        rows[contacts[i].address].held = a + b * (x - middle_x) + c * (y - middle_y)
-
-
-@kernel
-def in_plane(one: Any, other: Any) -> Any:
-    """Where a contact is in the tangents of another one, m."""
-    x, y = 0.0, 0.0
-    for j in range(3):
-        way = other.pos[j] - one.pos[j]
-        x, y = x + one.frame[1, j] * way, y + one.frame[2, j] * way
-    return x, y
+    if not memory.law.rigid:
+        for i in range(memory.contacts):
+            rows[contacts[i].address].held = 0.0
 
 
 @kernel

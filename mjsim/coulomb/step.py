@@ -45,6 +45,7 @@ from .rigid import (
     add_dampers,
     add_gyroscopic_moments,
     oppose_slip_at_mid_step,
+    share_loads,
     share_softness,
     stiffen,
     take_depth_away,
@@ -127,7 +128,9 @@ def find_references(model: Any, data: Any, memory: Any, gravity: float, since: f
         take_depth_away(model, data, memory)
     if since > 0:
         add_turning(model, data, memory, since)
-    set_up(model, data, memory)
+    set_up(data, memory)
+    if memory.law.rigid:
+        share_loads(model, memory)
 
 
 @kernel
