@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
-from importlib import import_module
 from types import ModuleType
 from typing import Any
 
@@ -88,8 +87,13 @@ def simulate(
 def simulator(settings: Settings) -> ModuleType:
     """The module of the method, with `carry_out` and `sample_forces`."""
     # here, because the integrators of scipy take half a second to load, and numba a while
-    name = "hybrid" if settings.method == "event" else "time_stepping"
-    return import_module(f"analytic.simulation.{name}")
+    if settings.method == "event":
+        from analytic.simulation import hybrid
+
+        return hybrid
+    from analytic.simulation import time_stepping
+
+    return time_stepping
 
 
 def slip_perturbation(p: Parameters, slip: float, beta: float, t_end: float) -> Trajectory:
