@@ -191,10 +191,13 @@ def _loop_rows(
         of_level = {column: getattr(run, column)[held] for column in columns(Trajectory)}
         part, loose = replace(run, **of_level), runner.sampling.settled_loose
         ended = settling.judge_run(replace(level, x0=part.x[0]), task, part, loose)
-        # Next to where the wall begins to carry the ball it slips there more slowly than shows, on
-        # a floor that bears next to nothing. (Chosen after a level had been seen 3e-5 below that.)
-        untold = "its slip on the wall is too slow for its case to be told"
-        if why := ended.failure or untold * (ended.case is Case.SR):
+        why = ended.failure
+        if not why and ended.case is Case.SR:
+            # Next to where the wall begins to carry the ball it slips there more slowly than shows,
+            # on a floor that bears next to nothing. (Chosen after a level had been seen 3e-5 below
+            # that.)
+            why = "its slip on the wall is too slow for its case to be told"
+        if why:
             where = f"level {k + 1} ({level.name}, omega_0 = {p.omega_0:.4g} rad/s)"
             yield runner.missing(level.set, f"{where}: {why}")
         else:

@@ -574,14 +574,13 @@ def lift(runner: Runner, sets: Sets, records: Records) -> Measured:
             why = f"a ball that leaves the floor out of {arrow.inner.name} ends in {leaves.name}"
             yield runner.missing(arrow.set, why)
         elif bracket:
-            last = [run for run in bracket.runs[:1] if run]
-            if bracket.failure or not arrow.staying(last):
+            last, _ = bracket.runs
+            if bracket.failure or not last or not arrow.staying([last]):
                 slips = "the ball slips before it leaves the floor"
                 why = f"the run {bracket.failure}" if bracket.failure else slips
                 yield runner.missing(arrow.set, f"out of {arrow.inner.name}: {why}")
             else:
-                place, unit = bracket.place, 1 / time_unit(arrow.p)
-                yield arrow.row("lift_onset", unit, place, bracket.tasks)
+                yield arrow.row("lift_onset", 1 / time_unit(arrow.p), bracket.place, bracket.tasks)
         elif isinstance(near, str) or (onset := _onset(near)) is None:
             chatters = "the contact at the floor opens and closes"
             why = f"the run {near}" if isinstance(near, str) else chatters

@@ -293,8 +293,9 @@ class Findings:
         # distance.
         _, above = of.runs
         speed = max(slip(speeds, above) for speeds in sliding_speeds(above)) if above else 0.0
-        unseen = max(of.width / max(1.0, speed), SLIP_SEEN * of.high)
-        unseen = unseen if quantity in ("omega_01", "omega_02") else 0.0
+        unseen = 0.0
+        if quantity in ("omega_01", "omega_02"):
+            unseen = max(of.width / max(1.0, speed), SLIP_SEEN * of.high)
         return self.row(quantity, of.place.also(unseen_slip=unseen), of.tasks, side=side, by=by)
 
     def rows_of_zero(self, kind: Beside, what: str, quantity: str, side: str, by: str) -> Measured:
