@@ -15,6 +15,7 @@ import subprocess
 import threading
 import time
 from concurrent.futures import Future, ThreadPoolExecutor, wait
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -142,6 +143,19 @@ def test_passing_runs_are_stored_where_memory_is_short_or_they_took_long(
             campaign.reduce()
             assert [path.name for path in written(tmp_path / where)] == ["runs.h5"]
             assert campaign.load(tasks()[4].key).header.parameters == tasks()[4].parameters
+
+
+def test_what_memory_cannot_hold_goes_into_files_as_long_as_a_batch(tmp_path, monkeypatch):
+    """Runs of 201 samples each, of which five are held and two make a batch; a file of all that
+    were held would be read again for each of its runs."""
+    monkeypatch.setattr("compare.kit.campaign.READ", 1100)
+    monkeypatch.setattr("compare.kit.campaign.HELD", 450)
+    asked = [replace(task, sample_interval=1e-3) for task in tasks(8)]
+    with Campaign(tmp_path, workers=0, passing=True) as campaign:
+        assert all(len(run.time) == 201 for run in campaign.run(asked))
+        counts = [len(storage.load_runs(path)) for path in written(tmp_path)]
+    assert len(counts) >= 3
+    assert set(counts) == {2}
 
 
 def test_runs_that_are_stored_are_not_handed_out(tmp_path):

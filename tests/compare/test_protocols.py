@@ -419,6 +419,14 @@ def test_what_quadratic_drag_does_not_settle_has_no_values(runner, monkeypatch):
     assert any("quadratic drag fades with the lag" in each.reason for each in found.missing)
 
 
+def test_nor_has_it_values_in_a_flow_the_other_way_round(runner):
+    found = Records.of(settled.mirrored(runner, {"blunt": QUICK["blunt"]}, Records()))
+    values = {(m.at["start"], m.quantity) for m in found.measurements}
+    assert ("rest", "omega_c") in values
+    assert ("on the wall", "omega_c") not in values
+    assert any("quadratic drag fades with the lag" in each.reason for each in found.missing)
+
+
 def test_what_swings_for_ever_settles_by_going_on_from_its_mean(runner, monkeypatch):
     """A ball that sinks along the wall: also where a round is rounded to another length than the
     usual one."""
@@ -669,14 +677,6 @@ def test_a_ball_leaves_the_floor_where_it_does_however_it_shared_its_load(runner
     )
     assert onset.value == pytest.approx(14.68884, abs=3 * onset.uncertainty)
     assert onset.uncertainty < 1e-4 * onset.value
-
-
-def test_nor_has_it_in_a_flow_the_other_way_round(runner):
-    found = Records.of(settled.mirrored(runner, {"blunt": QUICK["blunt"]}, Records()))
-    values = {(m.at["start"], m.quantity) for m in found.measurements}
-    assert ("rest", "omega_c") in values
-    assert ("on the wall", "omega_c") not in values
-    assert any("quadratic drag fades with the lag" in each.reason for each in found.missing)
 
 
 @pytest.mark.parametrize("coarse", [3.0, 2.5, 0.5])
