@@ -42,7 +42,7 @@ class Coulomb:
         has no pyramid: the cone is elliptic while the law acts, and then again what it was. So give
         a model whose forces you read by `mj_contactForce` the elliptic cone, or read them in
         `acting`: MuJoCo would take the rows for a pyramid's. Newton's method stands in for the
-        solver PGS as long
+        solver PGS while the law acts
     rigid : False: MuJoCo's own contacts, whose depth, bounce and damping `solref` and `solimp` say.
         True: Moreau and Jean's time stepping, in which contacts have no depth to speak of and land
         within one step. Geoms get a `margin` in which contacts are seen ahead, but bear nothing: at
