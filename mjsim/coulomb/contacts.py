@@ -121,6 +121,8 @@ def read_gaps(data: Any, memory: Any) -> None:
     for i in range(memory.contacts):
         given = found[contacts[i].index]
         contacts[i].gap, contacts[i].margin = given.dist, given.includemargin
+        for axis in range(3):
+            contacts[i].turned[axis] = 0.0
     poses = engine_contacts(memory.pose_at, data.ncon)
     for i in range(data.ncon):
         if poses[i].exclude and found[i].efc_address >= 0:
@@ -193,7 +195,7 @@ def clear(contact: Any) -> None:
     contact.predicted, contact.found, contact.extrapolated = 0.0, 0.0, 0.0
     contact.bias, contact.error, contact.weakened = 0.0, 0.0, 0
     for axis in range(3):
-        contact.velocity[axis] = 0.0
+        contact.velocity[axis] = contact.turned[axis] = 0.0
         for kind in range(2):
             contact.carried[axis, kind] = 0.0
             contact.friction[0, axis, kind] = contact.friction[1, axis, kind] = 0.0

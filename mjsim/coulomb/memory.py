@@ -63,6 +63,7 @@ CONTACT = np.dtype(
         ("mu", _f8, 5),  # coefficients of friction: two of sliding, of spin, two of rolling, m
         ("cone", _f8),  # MuJoCo's regular coefficient, of the cone in scaled forces
         ("weakened", _i4),  # whether they are kinetic
+        ("turned", _f8, 3),  # what its rows leave out, by axis, as its Jacobian turns, m s-2
         ("moved", _f8),  # square of how far it has moved on its bodies, m2
         ("closes", _i4),  # whether Newton's method has just found that it does
         ("share", _f8),  # part of friction without a limit that it has

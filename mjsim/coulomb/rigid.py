@@ -194,7 +194,8 @@ def take_depth_away(model: Any, data: Any, memory: Any) -> None:
 def oppose_slip_at_mid_step(model: Any, data: Any, memory: Any, gravity: float) -> bool:
     """Let friction of what slides fast oppose its slip at mid step; whether there is any.
 
-    That is of second order; where slip may end within the step, it must oppose that at the end, and
+    That is of second order, by the Jacobian of where bodies are: velocities lie half a step to
+    either side. Where slip may end within the step, it must oppose that at the end, and
     in an impact, where a load changes by more than a weight, that after it (Moreau).
     """
     contacts, rows, h, some = contacts_of(memory), rows_of(memory), model.opt.timestep, False
@@ -215,6 +216,7 @@ def oppose_slip_at_mid_step(model: Any, data: Any, memory: Any, gravity: float) 
         for t in range(contact.dim - 1):
             row = rows[contact.address + 1 + t]
             more = velocity[contact.address + 1 + t] / h
+            more -= contact.turned[1 + t] if t < 2 else 0.0
             row.reference -= more
             row.residual += more
         contact.extrapolated = shift(rows, contact)

@@ -90,4 +90,5 @@ def add_turning(model: Any, data: Any, memory: Any, elapsed: float) -> None:
             for j in range(3):
                 before += contact.frame[axis, j] * contact.velocity[j]
             change = times(memory, rows[contact.address + axis], velocity) - before
-            reference[contact.address + axis] -= change * share
+            contact.turned[axis] = change * share
+            reference[contact.address + axis] -= contact.turned[axis]
