@@ -20,6 +20,7 @@ from compare.convergence import Ends, zero_step_limits
 from compare.judge import (
     checks_of,
     counted,
+    covered,
     inconclusive_criteria,
     lost_to,
     outcome,
@@ -108,7 +109,7 @@ def assess(
         checks, orders = _loosened(found[max(found)], by.relative_tolerance), []
     else:
         limits = zero_step_limits(found, finest, ends)
-        checks = tuple(check for check, _ in limits)
+        checks = tuple(covered(check for check, _ in limits))
         orders = [order for _, order in limits if math.isfinite(order)]
     most = reduce(or_, map(per_criterion, found.values()))
     wanted = most | Counter(n for n, _ in shared) | Counter({check.criterion for check in trial})
@@ -134,7 +135,7 @@ def assess(
 def _loosened(checks: Sequence[Check], share: float) -> tuple[Check, ...]:
     """Checks whose numbers may be off by a share of their scales: they have no limit."""
     return tuple(
-        replace(c, tolerance=share * c.scale, required=2 * share)
+        replace(c, uncertainty=share * c.scale / c.coverage, required=2 * share)
         if quantity(c.measurement.quantity).resolution
         else c
         for c in checks

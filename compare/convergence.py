@@ -130,11 +130,11 @@ def zero_step_limit(series: StepSeries, ends: Ends = frozenset()) -> Limit | Non
     taken = safety * (limit.value - errors[-1])
     hidden = _hidden_by_brackets(series) if is_threshold else 0.0
     looser = max(required, min(LOOSER * required, COARSEST))
-    doubt = max(math.hypot(limit.uncertainty, taken, hidden), SAME * looser / COVERAGE)
+    least = SAME * looser / COVERAGE
+    doubt = max(math.hypot(limit.uncertainty, taken, hidden), least) * scale
     value = series.last.predicted + limit.value * scale
-    measured = replace(m, value=value, uncertainty=doubt * scale)
-    tolerance = COVERAGE * measured.uncertainty
-    return replace(series.last, measurement=measured, tolerance=tolerance, required=looser), order
+    measured = replace(m, value=value, uncertainty=doubt)
+    return replace(series.last, measurement=measured, uncertainty=doubt, required=looser), order
 
 
 def _next_to_threshold(m: Measurement, ends: Ends) -> bool:

@@ -21,7 +21,6 @@ from compare.kit import drawing, style
 from compare.kit.drawing import Drawing, Evidence, Figures, GapError
 from compare.kit.pictures import embedded, svg
 from compare.kit.record import Check
-from compare.kit.statistics import COVERAGE
 from compare.kit.tasks import sources
 from compare.kit.workers import JUDGING, LateError, Spread, at_most
 from model import InputError, Parameters, StorageError
@@ -73,7 +72,7 @@ def draw_deviations(checks: Checks) -> tuple[Figure, str]:
     height = 0.75 + len(names) * (0.15 + 0.12 * len(engines)) + 0.25 * (len(engines) > 1)
     figure = Figure(figsize=(_WIDTH, height))
     axes = figure.add_subplot()
-    for band, grey in ((1, "0.93"), (1 / COVERAGE, "0.86")):
+    for band, grey in ((1, "0.93"), (1 / checks[0].coverage, "0.86")):
         axes.axvspan(_FRAME[0] / 2, band, color=grey, lw=0, zorder=0)
     for k in range(1, len(names)):
         axes.axhline(k - 0.5, color="white", lw=1.5, zorder=0.5)

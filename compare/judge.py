@@ -14,7 +14,7 @@ from analytic.orbits.periodic import NoOrbitError
 from compare.claim import Claim, Criterion, Outcome, Verdict
 from compare.kit.quantities import quantity
 from compare.kit.record import Check, Measurement, Missing, Records
-from compare.kit.statistics import COVERAGE, Estimate
+from compare.kit.statistics import Estimate, coverage
 from model import Flow, InputError, Parameters, SimulationError, Trajectory
 from model.errors import suggestion
 
@@ -139,11 +139,18 @@ def inconclusive_criteria(checks: Iterable[Check], wanted: Counter[int]) -> dict
 
 def checks_of(claim: Claim, records: Records) -> list[Check]:
     """Every measurement that bears on a claim beside its prediction."""
-    return [
+    return covered(
         replace(check(criterion, m), criterion=n)
         for n, criterion in enumerate(claim.criteria)
         for m in records.select(criterion.protocol, criterion.quantity, criterion.when)
-    ]
+    )
+
+
+def covered(checks: Iterable[Check]) -> list[Check]:
+    """The checks of a claim, with tolerances for as many numbers as there are."""
+    checks = list(checks)
+    wide = coverage(sum(check.uncertainty > 0 for check in checks))
+    return [replace(check, coverage=wide) for check in checks]
 
 
 def check(criterion: Criterion, m: Measurement) -> Check:
@@ -158,7 +165,7 @@ def check(criterion: Criterion, m: Measurement) -> Check:
     return Check(
         measurement=m,
         predicted=own.value,
-        tolerance=COVERAGE * math.hypot(m.uncertainty, own.uncertainty),
+        uncertainty=math.hypot(m.uncertainty, own.uncertainty),
         scale=1.0 if known.resolution == 0 else size,
         relation=criterion.relation,
     )

@@ -24,7 +24,7 @@ import numpy as np
 
 from compare.kit.conditions import Conditions
 from compare.kit.quantities import quantity
-from compare.kit.statistics import Estimate
+from compare.kit.statistics import COVERAGE, Estimate
 from model import Case, Parameters, StorageError
 from model.hdf5 import WholeFile, column, dataset, reading, write_columns
 from model.kinematics import VARIABLES
@@ -110,10 +110,12 @@ class Check:
     measurement: Measurement
     predicted: float
     """nan where theory knows no such state."""
-    tolerance: float
-    """Largest deviation that still agrees."""
+    uncertainty: float
+    """Standard uncertainty of the deviation."""
     scale: float
     relation: Relation = Relation.EQUAL
+    coverage: float = COVERAGE
+    """Standard uncertainties in its tolerance."""
     required: float | None = None
     """Its required resolution, where that isn't what its quantity says."""
     criterion: int = 0
@@ -126,6 +128,11 @@ class Check:
         if self.relation is Relation.AT_MOST:
             return max(error, 0.0)
         return min(error, 0.0) if self.relation is Relation.AT_LEAST else error
+
+    @property
+    def tolerance(self) -> float:
+        """Largest deviation that still agrees."""
+        return self.coverage * self.uncertainty
 
     @property
     def share(self) -> float:

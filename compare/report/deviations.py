@@ -14,7 +14,6 @@ from statistics import median
 from compare.claim import Verdict
 from compare.kit.quantities import QUANTITIES
 from compare.kit.record import Check, Relation
-from compare.kit.statistics import COVERAGE
 
 SOLVERS = frozenset({"solver", "solver_at_random", "rounding"})
 """Causes of which one accuracy is known for all numbers. What is left of them is spread over many
@@ -59,7 +58,7 @@ def deviations(checks: Iterable[Check]) -> list[Deviation]:
     found = {}
     for check in checks:
         m = check.measurement
-        size = COVERAGE * check.share
+        size = check.coverage * check.share
         if check.tolerance and check.relation is Relation.EQUAL and math.isfinite(size):
             where = m.protocol, m.set, m.parameters.omega_0, tuple(sorted(m.at.items()))
             most = max(m.budget, key=m.budget.__getitem__, default="")

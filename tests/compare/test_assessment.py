@@ -124,7 +124,7 @@ def test_brackets_of_thresholds_hide_what_changes_with_the_step(errors, agrees):
     that stays off is."""
     places = [measured("thresholds", "omega_01", 10 * (1 + error), 1.4e-3) for error in errors]
     checks = [
-        Check(measurement=place, predicted=10.0, tolerance=0.0, scale=10.0) for place in places
+        Check(measurement=place, predicted=10.0, uncertainty=0.0, scale=10.0) for place in places
     ]
     limit = zero_step_limit(StepSeries((2, 3, 4), tuple(checks)))
     assert (limit and limit[0].agrees) is agrees

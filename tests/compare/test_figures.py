@@ -91,11 +91,11 @@ def test_special_points_lie_on_curves(name):
             assert np.linalg.norm(begin + along[:, None] * step - dot, axis=1).min() < 1e-3
 
 
-def check(omega_0, predicted, tolerance=3e-9, quantity="omega_c", **conditions):
+def check(omega_0, predicted, uncertainty=1e-9, quantity="omega_c", **conditions):
     """A number that was measured at a flow, its value too."""
     p = Parameters.named("reference").replace(omega_0=omega_0)
     m = measured("settled", quantity, omega_0, 1e-9, p, **conditions)
-    return Check(measurement=m, predicted=predicted, tolerance=tolerance, scale=1.0)
+    return Check(measurement=m, predicted=predicted, uncertainty=uncertainty, scale=1.0)
 
 
 @pytest.mark.parametrize(("name", "wrong"), [("fig-7", [10.0]), ("fig-8", [])])
@@ -125,7 +125,7 @@ def test_deviations_are_drawn_over_tolerance():
     near, far, equal, count = (
         check(10.0, predicted) for predicted in (10.0 - 1.5e-9, 9.0, 10.0, 10.0)
     )
-    count = dataclasses.replace(count, tolerance=0.0)
+    count = dataclasses.replace(count, uncertainty=0.0)
     drawing = figures_of("x")["claim-x"]
     figure, caption = drawing.draw(drawing.select(Evidence({"x": (near, far, equal, count)})))
     (axes,) = figure.axes

@@ -57,6 +57,21 @@ def test_a_verdict_is_computed_from_the_numbers(value, uncertainty, expected):
     assert outcome(claim(), measured(value, uncertainty)) is expected
 
 
+@pytest.mark.parametrize(
+    ("count", "off", "expected"),
+    [
+        (1, 2.9, Outcome.CONFIRMED),
+        (1, 3.1, Outcome.REFUTED),
+        (100, 3.1, Outcome.CONFIRMED),
+        (100, 4.3, Outcome.REFUTED),
+    ],
+)
+def test_one_of_many_numbers_may_be_farther_off_by_chance(count, off, expected):
+    values = [P.omega_0 * (1 + FINE * off), *[P.omega_0] * (count - 1)]
+    records = sum((measured(value, FINE * P.omega_0) for value in values), Records())
+    assert outcome(claim(), records) is expected
+
+
 def test_without_measurements_it_was_not_run_and_the_reason_is_kept():
     why = Missing("settled", "mine", "nothing settles")
     other = Missing("other", "mine", "no matter")

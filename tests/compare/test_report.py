@@ -42,8 +42,8 @@ def claim(name: str, **others: Any) -> Claim:
     )
 
 
-def checks(count: int, deviation: float = 0.0, tolerance: float = 3e-9) -> tuple[Check, ...]:
-    """Made-up numbers, each with the same tolerance, the k-th off by k parts of `deviation`."""
+def checks(count: int, deviation: float = 0.0, uncertainty: float = 1e-9) -> tuple[Check, ...]:
+    """Made-up numbers, each as uncertain, the k-th off by k parts of `deviation`."""
     conditions = {
         "case": "RR",
         "start": "a start with a name that is rather long",
@@ -62,7 +62,7 @@ def checks(count: int, deviation: float = 0.0, tolerance: float = 3e-9) -> tuple
         Check(
             measurement=m,
             predicted=12.0 - deviation * (k + 1) / count,
-            tolerance=tolerance,
+            uncertainty=uncertainty,
             scale=12.0,
         )
         for k, m in enumerate(rows)
@@ -204,7 +204,7 @@ def test_verdicts_are_said_alike_in_the_terminal_on_the_page_and_in_the_summary(
     m = dataclasses.replace(checks(1)[0].measurement, quantity="case")
     # Counts have no tolerance.
     for predicted, said in ((12.0, "none: all equal"), (1.0, "not equal: case, reference")):
-        check = Check(measurement=m, predicted=predicted, tolerance=0.0, scale=1.0)
+        check = Check(measurement=m, predicted=predicted, uncertainty=0.0, scale=1.0)
         found = wording.findings(dataclasses.replace(RAN[0], checks=(check,)))
         assert found == {"Largest deviation": said}
     bad = results.load(page.parent).verdicts["bad"]

@@ -266,7 +266,7 @@ def test_what_a_set_of_ones_own_is_too_rough_for_is_no_failure(
     of, outcome, code, monkeypatch, tmp_path, capsys
 ):
     row = measured("round", "omega_c", 12.0, 1.0, set=of)
-    check = Check(measurement=row, predicted=12.0, tolerance=1.0, scale=12.0)
+    check = Check(measurement=row, predicted=12.0, uncertainty=0.3, scale=12.0)
     found = Verdict(claim=about("round"), outcome=outcome, checks=(check,))
     monkeypatch.setattr(validation, "judge_stored", lambda *_: [found])
     ended, said, _ = carried_out(capsys, f"judge {tmp_path}")
