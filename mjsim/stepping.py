@@ -30,12 +30,14 @@ from model.arrays import Array
 _NEAR, _PART, _MOST = 32.0, 0.25, 1024
 """Steps to the axis below which they are shorter, where it is nearer than that part of R; into how
 many parts, at most, a step is divided."""
-_CHANGE = 0.1
-"""Part of the weight: as long as a contact force changes by more in a step, those after a landing
-are divided, too. (Chosen after balls that hop had been seen.)"""
+_SLOW, _LEAST, _AFTER = 32.0, 3e-2, 32
+"""Slip, in units of its change in a step, up to which steps after a landing are divided, too: where
+slip is slow, friction turns fast; the least change, in units of a fall in a step; for how many
+steps. (Chosen after balls that hop had been seen.)"""
 SHARE = 1e-5
 """`share` of the law: part of gravity to which the slip of contacts must be predicted."""
 _NORMAL_A, _NORMAL_B = range(NSENSOR)[recorder.NORMALS]
+_SLIP_A, _, _SLIP_B, _ = recorder.SLIPS
 
 
 class Joints(NamedTuple):
@@ -51,12 +53,12 @@ class Joints(NamedTuple):
     """Gaps at which contacts are in sight, m."""
     last: Any
     """Velocities along the paper's axes a step ago."""
-    loads: Any
-    """Normal forces at A and B a step ago, N."""
+    slips: Any
+    """Slip at A and B a step ago, along two tangents, m s-1."""
     landed: Any
-    """Whether the last step was divided for a landing, an array of one."""
-    weight: float
-    """N"""
+    """How many more steps may be divided for a landing, an array of one."""
+    g: float
+    """m s-2"""
     ball: BallConstants
     ahead: float
     """Steps by which places, and forces, are ahead of velocities."""
@@ -90,19 +92,19 @@ def velocity_of(body: Joints) -> Velocity:
 
 def lands(body: Joints) -> bool:
     """Whether the ball comes to touch floor or wall in the next step, faster than by the fall of a
-    part of it; or has done so, and contact forces still change. Notes these."""
-    slowest = body.weight / body.ball.mass * body.step / LANDING_PARTS
-    lands, changes = False, False
-    for k, i, normal in ((0, 2, _NORMAL_A), (1, 1, _NORMAL_B)):
-        v, load = body.qvel[i], body.sensors[normal]
+    part of it; or has done so, and slips slowly. Notes how it slips."""
+    fall, lands, slow = body.g * body.step, False, False
+    for k, i, normal, slip in ((0, 2, _NORMAL_A, _SLIP_A), (1, 1, _NORMAL_B, _SLIP_B)):
+        v, closed = body.qvel[i], body.sensors[normal] > 0
         way = body.step * (2 * v - body.last[i])  # if it goes on as in the last step
-        lands |= load == 0 and v < -slowest and body.qpos[i] + way < 0
-        changes |= abs(load - body.loads[k]) > _CHANGE * body.weight
-        body.loads[k] = load
-    lands |= changes and body.landed[0]
+        lands |= not closed and v < -fall / LANDING_PARTS and body.qpos[i] + way < 0
+        one, other = body.sensors[slip], body.sensors[slip + 1]
+        change = math.hypot(one - body.slips[k, 0], other - body.slips[k, 1])
+        slow |= closed and change > _LEAST * fall and math.hypot(one, other) < _SLOW * change
+        body.slips[k, 0], body.slips[k, 1] = one, other
     lands &= body.ahead > 0
-    body.landed[0] = lands
-    return lands
+    body.landed[0] = _AFTER if lands else max(body.landed[0] - 1, 0)
+    return lands or (slow and body.landed[0] > 0)
 
 
 def stop_landing(body: Joints) -> None:
@@ -219,9 +221,9 @@ class JointedBall:
             tangent=data.mocap_quat[0],
             margins=model.pair_margin,
             last=np.array(v, float),
-            loads=np.zeros(2),
-            landed=np.zeros(1, bool),
-            weight=p.m * p.g,
+            slips=np.zeros((2, 2)),
+            landed=np.zeros(1, int),
+            g=p.g,
             ball=BallConstants(*map(float, BallConstants.of(p))),
             ahead=settings.midpoint,
             step=settings.timestep,

@@ -113,14 +113,24 @@ def find_forces(model: Any, data: Any, memory: Any) -> float:
                 off = abs(rows[r].R * (rows[r].force - rows[r].remembered))
                 contact.error = max(contact.error, off)
         contact.state, contact.found = state, slip
-        extrapolated = memory.law.rigid and state == SLIDES and contact.extrapolated >= 0
-        missed = (contact.bias + slip - contact.extrapolated) / 2
-        contact.bias = missed if extrapolated else 0.0
         worst = max(worst, contact.error)
+        learn(memory, contact)
     for r in range(memory.first_dry, memory.first_dry + memory.dry):
         dry = rows[r]
         dry.force = min(max(-dry.residual / dry.R, -dry.limit), dry.limit)
     return worst
+
+
+@kernel
+def learn(memory: Any, contact: Any) -> None:
+    """Learn from the slip of a rigid contact how wrong its prediction was, or would have been in a
+    step that was solved."""
+    if not memory.law.rigid or contact.state != SLIDES or contact.extrapolated < 0:
+        contact.bias = 0.0
+        return
+    foreseen = max(contact.extrapolated + contact.bias, 0.0)
+    contact.error = max(contact.error, abs(contact.found - foreseen))
+    contact.bias = (contact.bias + contact.found - contact.extrapolated) / 2
 
 
 @kernel
@@ -205,6 +215,17 @@ def predict_slip(model: Any, data: Any, memory: Any, enough: float, gravity: flo
         changes = abs(normal) > gravity or (contact.predicted == 0 and slip > gravity)
         doubt |= rigid and changes
     return doubt
+
+
+@kernel
+def foresee(model: Any, data: Any, memory: Any) -> None:
+    """Find what would have been predicted of a step that was solved: the next one need not be, if
+    that was right."""
+    contacts, rows = contacts_of(memory), rows_of(memory)
+    multiply(memory, reals(data.qacc, model.nv))
+    subtract_references(memory)
+    for i in range(memory.contacts):
+        contacts[i].extrapolated = shift(rows, contacts[i])
 
 
 @kernel

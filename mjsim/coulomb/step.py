@@ -32,6 +32,7 @@ from .engine import (
 )
 from .friction import (
     find_forces,
+    foresee,
     predict_slip,
     store_forces,
     strengthen,
@@ -250,6 +251,7 @@ def solve_rigid(
     subtract_references(memory)
     if oppose_slip_at_mid_step(model, data, memory, gravity):
         solved &= solve_contacts(model, data, memory, start, enough)
+    foresee(model, data, memory)
     return bool(solved)
 
 

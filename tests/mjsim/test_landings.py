@@ -27,10 +27,12 @@ def off(p, x0, lasts, step, initial_impact=False):
     return np.abs(run.x[-1] - exact)[1:6] * sizes / (step * max(p.g, p.omega_0 * speed))
 
 
-@pytest.mark.parametrize("step", [1e-3, 5e-4, 2.5e-4])
-def test_hops_are_of_first_order(step: float) -> None:
-    """Between the first landing and the next one, at 0.37 s."""
-    assert off(HOPS, HOPPING, 0.3, step).max() < 1
+@pytest.mark.parametrize("step", [1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5])
+def test_hops_are_right(step: float) -> None:
+    """After four landings. In half a millisecond after each slip all but ends at the wall and goes
+    on another way: with steps that weren't divided as long as that lasts, the shorter ones were off
+    by a tenth to a half."""
+    assert off(HOPS, HOPPING, 1.0, step).max() < 0.05
 
 
 def test_a_ball_that_is_dropped_rolls_on_as_fast_to_half_a_percent() -> None:
