@@ -22,8 +22,8 @@ from .step import TABLE, serve, table
 
 _SLOT = ctypes.c_void_p.in_dll(LIBRARY, "mjcb_control")
 
-_Switched = tuple[tuple[float, float], Callable[[], None]]
-"""Times that make dampers inertia, s; what puts a model's options back."""
+_Switched = tuple[float, Callable[[], None]]
+"""Time that makes what brakes inertia, s; what puts a model's options back."""
 
 
 class Callback:
@@ -33,7 +33,7 @@ class Callback:
         self._lock, self._users = threading.RLock(), 0
         self._before: int | None = None  # the callback that was there, by its address
         # by model: its users, whether they are rigid, and what `set` was given
-        self._options: dict[int, tuple[int, bool, tuple[float, float], Callable[[], None]]] = {}
+        self._options: dict[int, tuple[int, bool, float, Callable[[], None]]] = {}
         self._simulations: dict[int, Simulation] = {}
         self._installed: dict[int, Callable[[int], Simulation]] = {}
         self._ask = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)(self._adopt)
@@ -109,10 +109,10 @@ class Callback:
             self._publish()
             return bool(_SLOT.value == _served())
 
-    def set(self, model: Any, rigid: bool, switch: Callable[[], _Switched]) -> tuple[float, float]:
+    def set(self, model: Any, rigid: bool, switch: Callable[[], _Switched]) -> float:
         """Set MuJoCo's callback, unless it is set; the first user of a model switches its options.
 
-        Returns the times that make its dampers inertia, s.
+        Returns the time that makes what brakes inertia, s.
 
         Raises
         ------
@@ -121,11 +121,11 @@ class Callback:
         """
         with self._lock:
             known = self._options.get(model._address) or (0, rigid, *switch())
-            users, as_rigid, times, back = known
+            users, as_rigid, braking, back = known
             if as_rigid != rigid:
                 kinds = "rigid and soft Coulombs need different options"
                 raise ValueError(f"{kinds}: one at a time for a model")
-            self._options[model._address] = users + 1, rigid, times, back
+            self._options[model._address] = users + 1, rigid, braking, back
             self._users += 1
             before = _SLOT.value
             if before != _served():
@@ -133,18 +133,18 @@ class Callback:
                     self._before = before
                     self._publish()
                 _SLOT.value = _served()
-            return times
+            return braking
 
-    def dampers(self, model: int) -> tuple[float, float]:
-        """Times that make the dampers of a model inertia, s."""
-        return self._options[model][2] if model in self._options else (0.0, 0.0)
+    def braking(self, model: int) -> float:
+        """Time that makes what brakes in a model inertia, s."""
+        return self._options[model][2] if model in self._options else 0.0
 
     def unset(self, model: Any) -> None:
         """Put back options after their last user, and the callback, unless another one was set."""
         with self._lock:
-            users, rigid, times, back = self._options.pop(model._address)
+            users, rigid, braking, back = self._options.pop(model._address)
             if users > 1:
-                self._options[model._address] = users - 1, rigid, times, back
+                self._options[model._address] = users - 1, rigid, braking, back
             else:
                 back()
             self._users -= 1

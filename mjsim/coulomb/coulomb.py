@@ -184,7 +184,7 @@ class Coulomb:
         if self._restored is not None:
             simulation.restore(self._restored)
             self._restored = None
-        simulation.dampers[0] = CALLBACK.dampers(self.model._address)
+        simulation.braking[0] = CALLBACK.braking(self.model._address)
         simulation.active[0] = CALLBACK.installed(self.model._address)
         return simulation
 
@@ -326,7 +326,7 @@ class Coulomb:
         simulation = self._simulation(data)
         self._check()
         active = simulation.active[0]
-        simulation.dampers[0] = CALLBACK.set(self.model, self._law.rigid, self._switch)
+        simulation.braking[0] = CALLBACK.set(self.model, self._law.rigid, self._switch)
         simulation.active[0] = 1
         return simulation, active
 
@@ -335,38 +335,35 @@ class Coulomb:
         simulation.active[0] = active
         CALLBACK.unset(self.model)
 
-    def _switch(self) -> tuple[tuple[float, float], Callable[[], None]]:
+    def _switch(self) -> tuple[float, Callable[[], None]]:
         """Switch the model to options under which the law acts.
 
-        Rigid contacts ask for velocities after a step, so they must know of dampers: `add_dampers`
-        makes these inertia, and Euler's method leaves them alone. MuJoCo's integrators take them
-        into account, too, but only after contacts have been solved for.
+        Rigid contacts ask for velocities after a step, so they must know of what brakes:
+        `add_dampers` makes it inertia, and Euler's method leaves it alone. MuJoCo's integrators
+        take it into account, too, but only after contacts have been solved for.
 
         Returns
         -------
-        times that make dampers of joints, and servos on them, inertia, s; what puts options back
+        time that makes what brakes inertia, s; what puts options back
         """
-        option, h, model = self.model.opt, self.model.opt.timestep, self.model
+        option = self.model.opt
         cone, integrator, flags = option.cone, option.integrator, option.disableflags
-        accuracy, solver = option.ccd_tolerance, option.solver
-        armature, times = model.tendon_armature.copy(), (0.0, 0.0)
-        option.cone, implicit = _ELLIPTIC, integrator != _EULER
+        accuracy, solver, braking = option.ccd_tolerance, option.solver, 0.0
+        option.cone = _ELLIPTIC
         # from no force PGS only tries a normal one, which De Saxcé's shift keeps at none
         option.solver = _NEWTON if solver == _PGS else solver
         if self._law.rigid:
-            times = h * (implicit or not flags & _NO_DAMPING), h * implicit
+            if integrator != _EULER or not flags & _NO_DAMPING:
+                braking = float(option.timestep)
             option.integrator, option.disableflags = _EULER, flags | _NO_DAMPING
             # what lies on a smooth side rolls off if its point is a micrometre beside it
             option.ccd_tolerance = min(accuracy, CCD_TOLERANCE)
-            if implicit and model.ntendon:
-                model.tendon_armature += _tendon_inertia(model)
 
         def back() -> None:
             option.cone, option.integrator, option.disableflags = cone, integrator, flags
             option.ccd_tolerance, option.solver = accuracy, solver
-            model.tendon_armature[:] = armature
 
-        return times, back
+        return braking, back
 
     @contextlib.contextmanager
     def installed(self) -> Iterator[Coulomb]:
@@ -385,10 +382,10 @@ class Coulomb:
         self._check()
         if CALLBACK.installed(address):
             raise ValueError("this model is under installed() already")
-        times = CALLBACK.set(self.model, self._law.rigid, self._switch)
+        braking = CALLBACK.set(self.model, self._law.rigid, self._switch)
         CALLBACK.install(address, self._adopt, self._simulations)
         for simulation in self._simulations.values():
-            simulation.active[0], simulation.dampers[0] = 1, times
+            simulation.active[0], simulation.braking[0] = 1, braking
         acted = True
         try:
             yield self
@@ -483,15 +480,3 @@ def _see_ahead(model: Any) -> None:
         np.minimum(ahead, most[np.array(pairs)].max(axis=0)),
         out=model.pair_margin,
     )
-
-
-def _tendon_inertia(model: Any) -> npt.NDArray[np.float64]:
-    """Inertia of the same effect as the dampers of tendons at the speed after a step, and as servos
-    on them, kg or kg m2."""
-    inertia: npt.NDArray[np.float64] = model.opt.timestep * model.tendon_damping
-    servos = model.actuator_biastype == int(mujoco.mjtBias.mjBIAS_AFFINE)
-    servos &= model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_TENDON)
-    for k in np.flatnonzero(servos).tolist():
-        damping = -model.actuator_biasprm[k, 2] * model.actuator_gear[k, 0] ** 2
-        inertia[model.actuator_trnid[k, 0]] += model.opt.timestep * damping
-    return inertia

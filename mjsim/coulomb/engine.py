@@ -82,9 +82,8 @@ MJ_MODEL = _only(
     structure("mjModel"),
     *("nv", "nbody", "njnt", "ngeom", "geom_rbound", "geom_bodyid"),
     *("body_rootid", "body_mocapid"),
-    *("nu", "jnt_type", "jnt_dofadr", "dof_damping", "actuator_biastype", "actuator_trntype"),
-    *("actuator_trnid", "actuator_gear", "actuator_biasprm"),
-    *("nC", "dof_parentid", "M_rownnz", "M_rowadr", "M_colind"),
+    *("nu", "jnt_type", "jnt_dofadr"),
+    *("nC", "nD", "dof_parentid", "M_rownnz", "M_rowadr", "M_colind", "mapD2M"),
     opt=MJ_OPTION,
 )
 MJ_DATA = _only(
@@ -94,7 +93,7 @@ MJ_DATA = _only(
     *("qvel", "qacc", "qacc_warmstart", "qfrc_bias", "xpos", "xmat", "crb", "cvel", "subtree_com"),
     *("efc_J", "efc_J_rownnz", "efc_J_rowadr", "efc_J_colind", "efc_KBIP", "efc_R", "efc_D"),
     *("efc_diagA", "efc_vel", "efc_aref", "efc_frictionloss"),
-    *("efc_type", "map_efc2iefc", "iefc_R", "iefc_D", "M", "qfrc_smooth", "qacc_smooth"),
+    *("efc_type", "map_efc2iefc", "iefc_R", "iefc_D", "M", "qDeriv", "qfrc_smooth", "qacc_smooth"),
 )
 WARNINGS = tuple(
     int(getattr(mujoco.mjtWarning, f"mjWARN_BAD{what}")) for what in ("QPOS", "QVEL", "QACC")
@@ -155,6 +154,7 @@ mj_makeConstraint, mj_island = _function("mj_makeConstraint"), _function("mj_isl
 mj_projectConstraint, mj_factorM = _function("mj_projectConstraint"), _function("mj_factorM")
 mj_isSparse = _function("mj_isSparse", types.int32, 1)
 mj_addContact = _function("mj_addContact", types.int32, 3)
+mjd_smooth_vel = _function("mjd_smooth_vel", arguments=3)
 
 
 # -- does it lie in memory as it is said? ----------------------------------------------------------

@@ -154,7 +154,9 @@ MEMORY = np.dtype(
         # steps that were solved; factorisations that took; steps that didn't reach their tolerance
         *((name, _i8) for name in ("solves", "factorisations", "unsolved")),
         ("active", _i8),  # whether the law applies
-        ("dampers", _f8, 2),  # times that make dampers of joints, and servos on them, inertia, s
+        ("braking", _f8),  # time that makes what brakes inertia, s; 0: nothing does, or not so
+        ("braked", _i8),  # the last number of M that it has changed, -1: none; what that is now
+        ("braked_is", _f8),
         *((f"room_{name}", _i8) for name in ("contacts", "rows", "jacobian")),
         *((f"{name}_at", _i8) for name in ("contact", "before", "row", "jacobian", "column")),
         *((f"{name}_at", _i8) for name in ("dry", "pose", "pair", "point", "xpos", "xmat", "body")),
@@ -162,6 +164,7 @@ MEMORY = np.dtype(
         # nv numbers each
         *((f"{name}_at", _i8) for name in ("residual", "tried", "step", "local")),
         *((f"{name}_at", _i8) for name in ("matrix", "place")),
+        ("inertia_at", _i8),  # M without what brakes, nC
     ],
     align=True,
 )
@@ -248,6 +251,7 @@ class Simulation:
         self.address = int(self.record.ctypes.data)
         self._arrays: dict[int, npt.NDArray[Any]] = {}  # by their addresses
         record, radius = self.record, model.geom_rbound
+        record["braked"] = -1
         record["law"], record["address"] = law.record(), self.address
         record["model"] = model._address
         self._sizes = sizes(model)
@@ -262,10 +266,11 @@ class Simulation:
         for name in ("residual", "tried", "step", "local"):
             self._own(name, np.zeros(nv))
         self._own("matrix", np.zeros((nv, nv)))
+        self._own("inertia", np.zeros(model.nC))
         self._own("xpos", np.zeros((model.nbody, 3)))
         self._own("xmat", np.zeros((model.nbody, 9)))
         self.make_room(16, 64, 64 * min(model.nv, 16))
-        self.active, self.dampers = record["active"], record["dampers"]
+        self.active, self.braking = record["active"], record["braking"]
         self.data: Callable[[], Any] = lambda: None
         self.reset()
         _SIMULATIONS[self.address] = self

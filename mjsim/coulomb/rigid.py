@@ -14,14 +14,12 @@ import mujoco
 
 from .compiling import kernel
 from .contacts import smaller_radius
-from .engine import integers, mj_factorM, reals
+from .engine import integers, mj_factorM, mj_fwdActuation, mjd_smooth_vel, reals
 from .friction import shift
 from .memory import SLIDES, bodies_at, contacts_of, rows_of
 from .parameters import ALIGNED, APART, BOUNCES, ITERATIONS, NARROW, STUCK, USUAL_STEP
 
-AFFINE, JOINT = int(mujoco.mjtBias.mjBIAS_AFFINE), int(mujoco.mjtTrn.mjTRN_JOINT)
 FREE, SLIDE = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_SLIDE)
-BIASES = int(mujoco.mjNBIAS)
 
 
 # -- contacts --------------------------------------------------------------------------------------
@@ -230,31 +228,33 @@ def oppose_slip_at_mid_step(model: Any, data: Any, memory: Any, gravity: float) 
 
 @kernel
 def add_dampers(model: Any, data: Any, memory: Any) -> None:
-    """Let dampers act at the velocity after the step: h times their damping is added to M.
+    """Let all that brakes act at the velocity after the step: M - h dF/dv, as `implicitfast` does.
 
-    So are the dampers of servos on joints, where the integrator is implicit.
+    MuJoCo knows which dampers, servos and muscles act, from the forces of actuators.
     """
-    damping, some = reals(model.dof_damping, model.nv), False
-    starts, lengths = integers(model.M_rowadr, model.nv), integers(model.M_rownnz, model.nv)
-    inertia = reals(data.M, model.nC)
-    for i in range(model.nv):
-        inertia[starts[i] + lengths[i] - 1] += memory.dampers[0] * damping[i]
-        some = some or damping[i] != 0
-    bias = integers(model.actuator_biastype, model.nu)
-    kind = integers(model.actuator_trntype, model.nu)
-    target = integers(model.actuator_trnid, (model.nu, 2))
-    gear = reals(model.actuator_gear, (model.nu, 6))
-    numbers = reals(model.actuator_biasprm, (model.nu, BIASES))
-    types, dofs = integers(model.jnt_type, model.njnt), integers(model.jnt_dofadr, model.njnt)
-    for k in range(model.nu):
-        joint = target[k, 0]
-        if bias[k] == AFFINE and kind[k] == JOINT and types[joint] >= SLIDE:
-            i = dofs[joint]
-            damper = -numbers[k, 2] * gear[k, 0] ** 2
-            inertia[starts[i] + lengths[i] - 1] += memory.dampers[1] * damper
-            some = some or damper != 0
-    if some:
+    if model.nu > 0:
+        mj_fwdActuation(memory.model, memory.data)
+    mjd_smooth_vel(memory.model, memory.data, 0)
+    derivative, place = reals(data.qDeriv, model.nD), integers(model.mapD2M, model.nC)
+    inertia, free = reals(data.M, model.nC), reals(memory.inertia_at, model.nC)
+    for k in range(model.nC):
+        free[k] = inertia[k]
+        inertia[k] -= memory.braking * derivative[place[k]]
+        if inertia[k] != free[k]:
+            memory.braked, memory.braked_is = k, inertia[k]
+    if memory.braked >= 0:
         mj_factorM(memory.model, memory.data)
+
+
+@kernel
+def take_dampers_away(model: Any, data: Any, memory: Any) -> None:
+    """Make M that of the bodies again, unless MuJoCo has done so: for whoever reads it between
+    steps, and for a call in which MuJoCo skips that stage."""
+    inertia, free = reals(data.M, model.nC), reals(memory.inertia_at, model.nC)
+    ours = memory.braked >= 0 and inertia[memory.braked] == memory.braked_is
+    for k in range(model.nC if ours else 0):
+        inertia[k] = free[k]
+    memory.braked = -1
 
 
 # -- vectors ---------------------------------------------------------------------------------------

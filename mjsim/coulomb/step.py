@@ -49,6 +49,7 @@ from .rigid import (
     share_loads,
     share_softness,
     stiffen,
+    take_dampers_away,
     take_depth_away,
     turn_accelerations,
 )
@@ -72,7 +73,8 @@ def law_of_a_step(m: int, d: int, at: int) -> None:
     if data.ncon == 0 and not rigid:  # nothing touches: all is MuJoCo's own
         forget_contacts(memory)
         return
-    if rigid:
+    take_dampers_away(model, data, memory)
+    if memory.braking > 0:
         add_dampers(model, data, memory)
     moved = not known or not nothing_moved(model, data, memory)
     update_contacts(model, data, memory, known, over, moved)
@@ -351,6 +353,7 @@ def finish(m: int, d: int, at: int, storing: bool) -> None:
     """
     model, data, memory = models(m, 1)[0], datas(d, 1)[0], memories(at, 1)[0]
     conclude(model, data, memory)
+    take_dampers_away(model, data, memory)
     if storing and not memory.stored:  # what goes on from here does as what is restored
         store(model, data, memory, True)
         memory.stored, memory.ncon = 1, -1

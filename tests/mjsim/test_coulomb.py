@@ -372,7 +372,7 @@ def test_a_rigid_box_stands_on_a_heightfield():
 
 @pytest.mark.parametrize("integrator", ["Euler", "implicitfast", "implicit"])
 def test_rigid_contacts_know_of_dampers(integrator):
-    """They become inertia, once, and motions stay as they are; `implicit` has Coriolis forces'
+    """They become inertia, once, as under `implicitfast`; `implicit` has Coriolis forces'
     derivative, too."""
     model = mujoco.MjModel.from_xml_string(
         f'<mujoco><option integrator="{integrator}" timestep=".002"/><worldbody><body><joint '
@@ -389,8 +389,12 @@ def test_rigid_contacts_know_of_dampers(integrator):
         'tendon="t" kp="3" kv="1"/>'
         "</actuator></mujoco>"
     )
-    plain = mujoco.MjData(model)
+    euler, plain = integrator == "Euler", mujoco.MjData(model)
+    if euler:
+        model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     mujoco.mj_step(model, plain, 100)
+    if euler:
+        model.opt.integrator = mujoco.mjtIntegrator.mjINT_EULER
     assert not plain.ncon
     for _ in range(2):
         law, data = Coulomb(model, rigid=True), mujoco.MjData(model)
@@ -398,6 +402,41 @@ def test_rigid_contacts_know_of_dampers(integrator):
         assert data.qpos == pytest.approx(
             plain.qpos, rel=1e-5 if integrator == "implicit" else 1e-9
         )
+
+
+TURNS = '<body><joint name="turn" axis="0 0 1" {0}/><geom size=".1" mass="1"/></body>'
+SLIDES = '<body><joint name="slide" type="slide" {0}/><geom size=".1" mass="1"/></body>'
+
+
+@pytest.mark.parametrize("integrator", ["Euler", "implicitfast"])
+@pytest.mark.parametrize(
+    ("bodies", "actuators", "option"),
+    [
+        (TURNS, '<velocity joint="turn" kv="100" forcerange="-.01 .01"/>', ""),
+        (TURNS, '<velocity joint="turn" kv="100" group="2"/>', 'actuatorgroupdisable="2"'),
+        (TURNS.format('damping="10"'), "", '><flag damper="disable"/></option><option'),
+        (TURNS, '<velocity jointinparent="turn" kv="100"/>', ""),
+        (SLIDES, '<motor joint="slide" damping="2000"/>', ""),
+        ('<body><freejoint/><geom size=".01" mass=".004"/></body>', "", 'viscosity="100"'),
+    ],
+    ids=["at its limit", "in a group", "disabled", "in the parent", "of an actuator", "fluid"],
+)
+def test_rigid_contacts_take_what_brakes_as_mujoco_has_it(integrator, bodies, actuators, option):
+    """Of servos at their limits, and of disabled ones, nothing; of stiff ones all, at the end of
+    the step; the inertia that others see afterwards is that of the bodies."""
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><option integrator="{integrator}" gravity="0 0 -9.8" {option}/><worldbody>'
+        f'{bodies.format("")}</worldbody><actuator>{actuators}</actuator></mujoco>'
+    )
+    one, other = mujoco.MjData(model), mujoco.MjData(model)
+    for data in (one, other):
+        data.ctrl[:] = 5.0
+        data.qfrc_applied[0] = 0.01
+    Coulomb(model, rigid=True).step(one, 100)
+    model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    mujoco.mj_step(model, other, 100)
+    assert one.qvel == pytest.approx(other.qvel, rel=1e-9, abs=1e-15)
+    assert pytest.approx(other.M) == one.M
 
 
 @pytest.mark.parametrize("integrator", ["Euler", "implicitfast"])
