@@ -89,6 +89,8 @@ ROW = np.dtype(
         # if it is the first of a unit of Newton's method: how many rows that has, else 0; its
         # contact, or -1; a degree of freedom that it moves, -1: none; the next unit of its island
         *((name, _i4) for name in ("dim", "contact", "dof", "next")),
+        # what mjData had before, and what it was told
+        *((name, _f8) for name in ("given_R", "given_reference", "told")),
         ("R", _f8),  # regularisation: acceleration per force, kg-1
         ("reference", _f8),  # acceleration it asks for without memory and shift, m s-2
         ("remembered", _f8),  # force of the step before, or of the last solution of this one, N
@@ -154,6 +156,7 @@ MEMORY = np.dtype(
         # steps that were solved; factorisations that took; steps that didn't reach their tolerance
         *((name, _i8) for name in ("solves", "factorisations", "unsolved")),
         ("active", _i8),  # whether the law applies
+        ("told", _i8),  # whether mjData was told its rows
         ("braking", _f8),  # time that makes what brakes inertia, s; 0: nothing does, or not so
         ("braked", _i8),  # the last number of M that it has changed, -1: none; what that is now
         ("braked_is", _f8),

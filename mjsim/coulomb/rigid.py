@@ -18,6 +18,7 @@ from .engine import integers, mj_factorM, mj_fwdActuation, mjd_smooth_vel, reals
 from .friction import shift
 from .memory import SLIDES, bodies_at, contacts_of, rows_of
 from .parameters import ALIGNED, APART, BOUNCES, ITERATIONS, NARROW, STUCK, USUAL_STEP
+from .rows import times
 
 FREE, SLIDE = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 
@@ -31,15 +32,21 @@ def stiffen(model: Any, data: Any, memory: Any, gravity: float) -> None:
     contacts, rows, law, h = contacts_of(memory), rows_of(memory), memory.law, model.opt.timestep
     estimate, velocity = reals(data.efc_diagA, data.nefc), reals(data.efc_vel, data.nefc)
     R, reference = reals(data.efc_R, data.nefc), reals(data.efc_aref, data.nefc)
+    free = reals(data.qacc_smooth, model.nv)  # of the last step, without impacts
     for i in range(memory.contacts):
         contact = contacts[i]
         normal, first = rows[contact.address], contact.address
         stuck = estimate[first] * normal.remembered > STUCK * gravity
         fastest = math.inf if is_moved_by_hand(model, contact) else h * gravity
         goal = velocity_to_ask_for(model, memory, contact, 0.0 if stuck else fastest)
-        if memory.bounces:
-            fall, share = h * max(-normal.residual, 0.0), restitution_of(memory, contact)
-            goal = max(goal, rebound(share, contact.gap, velocity[first], fall, h))
+        share = restitution_of(memory, contact) if memory.bounces else 0.0
+        if share > 0:
+            speed, fall = velocity[first], h * max(-times(memory, normal, free), 0.0)
+            parts = speed > BOUNCES * h * gravity
+            comes = contact.load == 0 and contact.gap + h * (speed - fall) > 0
+            # what an impact makes touch, or touch again, bounces in the next step
+            bounce = rebound(share, contact.gap, speed, fall, h)
+            goal = -APART if parts or comes else max(goal, bounce)
         factor = law.softness * estimate[first] / R[first]
         for r in range(first, first + contact.dim):
             R[r] *= factor

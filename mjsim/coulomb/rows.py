@@ -42,6 +42,29 @@ def set_up(data: Any, memory: Any) -> None:
 
 
 @kernel
+def read_rows(data: Any, memory: Any) -> None:
+    """Note what MuJoCo has given as regularisation and reference acceleration of all rows."""
+    rows = rows_of(memory)
+    R, reference = reals(data.efc_R, data.nefc), reals(data.efc_aref, data.nefc)
+    for r in range(len(rows)):
+        rows[r].given_R, rows[r].given_reference = R[r], reference[r]
+
+
+@kernel
+def put_rows_back(data: Any, memory: Any) -> None:
+    """Make rows MuJoCo's again that are still as it was told: in a call in which it skips the stage
+    that makes them."""
+    rows = rows_of(memory)
+    R, D = reals(data.efc_R, data.nefc), reals(data.efc_D, data.nefc)
+    reference = reals(data.efc_aref, data.nefc)
+    for r in range(len(rows) if memory.told and len(rows) == data.nefc else 0):
+        if reference[r] == rows[r].told:
+            reference[r], R[r] = rows[r].given_reference, rows[r].given_R
+            D[r] = 1 / R[r]
+    memory.told = 0
+
+
+@kernel
 def write_references(data: Any, memory: Any) -> None:
     """Tell MuJoCo reference accelerations that hold what is remembered, less De Saxcé's shift."""
     contacts = contacts_of(memory)
@@ -51,6 +74,9 @@ def write_references(data: Any, memory: Any) -> None:
         reference[r] = rows[r].reference + rows[r].R * rows[r].held
     for i in range(memory.contacts):
         reference[contacts[i].address] -= contacts[i].predicted
+    for r in range(len(rows)):
+        rows[r].told = reference[r]
+    memory.told = 1
 
 
 @kernel

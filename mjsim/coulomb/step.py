@@ -53,7 +53,15 @@ from .rigid import (
     take_depth_away,
     turn_accelerations,
 )
-from .rows import add_turning, multiply, set_up, store_velocities, write_references
+from .rows import (
+    add_turning,
+    multiply,
+    put_rows_back,
+    read_rows,
+    set_up,
+    store_velocities,
+    write_references,
+)
 
 
 @kernel
@@ -67,13 +75,14 @@ def law_of_a_step(m: int, d: int, at: int) -> None:
     model, data, memory = models(m, 1)[0], datas(d, 1)[0], memories(at, 1)[0]
     memory.model, memory.data = m, d
     rigid = memory.law.rigid
+    put_rows_back(data, memory)
+    take_dampers_away(model, data, memory)
     if memory.law.kinetic < 1:
         strengthen(data, memory)
     known, over, since = begin(model, data, memory)
     if data.ncon == 0 and not rigid:  # nothing touches: all is MuJoCo's own
         forget_contacts(memory)
         return
-    take_dampers_away(model, data, memory)
     if memory.braking > 0:
         add_dampers(model, data, memory)
     moved = not known or not nothing_moved(model, data, memory)
@@ -122,6 +131,7 @@ def find_references(model: Any, data: Any, memory: Any, gravity: float, since: f
 
     `since`: for how long contacts have turned along with their bodies, s; 0: they haven't.
     """
+    read_rows(data, memory)
     if memory.law.kinetic < 1:
         weaken(model, data, memory, gravity)
     multiply(memory, reals(data.qacc, model.nv))

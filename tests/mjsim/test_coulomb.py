@@ -426,7 +426,7 @@ def test_rigid_contacts_take_what_brakes_as_mujoco_has_it(integrator, bodies, ac
     the step; the inertia that others see afterwards is that of the bodies."""
     model = mujoco.MjModel.from_xml_string(
         f'<mujoco><option integrator="{integrator}" gravity="0 0 -9.8" {option}/><worldbody>'
-        f'{bodies.format("")}</worldbody><actuator>{actuators}</actuator></mujoco>'
+        f"{bodies.format('')}</worldbody><actuator>{actuators}</actuator></mujoco>"
     )
     one, other = mujoco.MjData(model), mujoco.MjData(model)
     for data in (one, other):
@@ -696,6 +696,39 @@ def test_kinetic_friction_is_not_taken_twice_from_contacts_that_are_asked_again(
         for _ in range(2):
             assert data.contact.friction[:, 0] == pytest.approx(0.25)
             mujoco.mj_forwardSkip(model, data, mujoco.mjtStage.mjSTAGE_POS, 0)
+
+
+@pytest.mark.parametrize("away", [0.01, 4e-3, 2e-3, 5e-4])
+def test_a_ball_that_is_hit_next_to_a_cushion_bounces_and_hits_back(away):
+    """Each impact follows the other in a step, or within it: one after the other they bounce."""
+    balls = "".join(
+        f'<body pos="{x} 0 .03"><freejoint/><geom size=".03" friction="0"/></body>'
+        for x in (-0.3, 0)
+    )
+    cushion = f'<geom type="box" pos="{0.08 + away} 0 .05" size=".05 1 .05" friction="0"/>'
+    model = world(FLOOR.replace("/>", ' friction="0"/>') + cushion + balls, 'timestep=".002"')
+    data, law = mujoco.MjData(model), Coulomb(model, rigid=True, restitution=1.0)
+    data.qvel[0] = 2.0
+    law.step(data, 200)
+    assert data.qvel[[0, 6]] == pytest.approx([-2.0, 0.0], abs=1e-3)
+
+
+def test_a_billiard_break_keeps_its_energy():
+    """Fifteen balls that all but touch, with hardly any friction."""
+    r, places = 0.0286, [(-0.3, 0.003)]
+    for row in range(5):
+        for k in range(row + 1):
+            places.append((1.0005 * row * r * 3**0.5, 1.0005 * (2 * k - row) * r))
+    balls = "".join(
+        f'<body pos="{x} {y} {r}"><freejoint/><geom size="{r}" mass=".17" friction="0"/></body>'
+        for x, y in places
+    )
+    model = world(FLOOR.replace("/>", ' friction="0"/>') + balls, 'timestep=".002"')
+    data, law = mujoco.MjData(model), Coulomb(model, rigid=True, restitution=1.0)
+    data.qvel[0] = 5.0
+    law.step(data, 150)
+    assert np.sort(np.abs(data.qvel))[-9] > 0.5  # they have gone apart
+    assert (data.qvel**2).sum() == pytest.approx(25.0, rel=1e-4)
 
 
 def test_restitution_of_each_geom():

@@ -575,6 +575,25 @@ def test_halves_on_a_pyramid_are_whole_steps():
     assert (halves.qpos == data.qpos).all()
 
 
+@WAYS
+@pytest.mark.parametrize("skips", [False, True])
+def test_calls_in_which_mujoco_skips_stages_change_nothing(rigid, skips):
+    """Rows and inertia that the law has changed once are MuJoCo's again before it does so anew."""
+    model, data = scene('integrator="implicitfast"', 'biastype="affine" biasprm="0 0 -3"')
+    seen, law = mujoco.MjData(model), Coulomb(model, rigid=rigid)
+    with law.installed():
+        for _ in range(60):
+            mujoco.mj_step(model, data)
+            mujoco.mj_step1(model, seen)
+            for _ in range(2):
+                if skips:
+                    mujoco.mj_forwardSkip(model, seen, mujoco.mjtStage.mjSTAGE_VEL, 1)
+                else:
+                    mujoco.mj_forward(model, seen)
+            mujoco.mj_step2(model, seen)
+    assert seen.qpos == pytest.approx(data.qpos, abs=1e-4)
+
+
 def test_one_law_at_a_time():
     """A second law neither takes the data of one that is installed nor silences it."""
     model, data = scene()
