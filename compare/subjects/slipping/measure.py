@@ -166,12 +166,13 @@ class Push:
         return SMALL_SLIPS if self.outer in (Case.RS, Case.SR) else LARGE_SLIPS
 
     def pair(self, size: float, divisor: int = 1) -> list[Task]:
-        """Tasks with one size of slip and both time steps, divided by `divisor`."""
+        """Tasks with one size of slip and both time steps, steps and times divided by
+        `divisor`."""
         p, x = self.start.p, self.start.x0.copy()
         x[SLIP_XYZ] += size * start_unit(p, x) * self.n
-        steps, step = RECORD_STEPS * divisor, coarse_step(p) / (STEP_RATIO * divisor)
+        step = coarse_step(p) / (STEP_RATIO * divisor)
         return [
-            self.runner.task(p, x, steps * step, step / n, samples=steps * n)
+            self.runner.task(p, x, RECORD_STEPS * step, step / n, samples=RECORD_STEPS * n)
             for n in self.runner.sampling.halves
         ]
 
