@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from .callback import CALLBACK
 from .memory import Simulation, check_state, sizes
-from .parameters import CCD_TOLERANCE, Law
+from .parameters import CCD_TOLERANCE, EARTH, Law
 from .step import finish
 
 _RK4, _EULER = int(mujoco.mjtIntegrator.mjINT_RK4), int(mujoco.mjtIntegrator.mjINT_EULER)
@@ -30,6 +30,7 @@ _ELLIPTIC = int(mujoco.mjtCone.mjCONE_ELLIPTIC)
 _PGS, _NEWTON = int(mujoco.mjtSolver.mjSOL_PGS), int(mujoco.mjtSolver.mjSOL_NEWTON)
 _NO_ACTUATION = int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
 _NO_DAMPING = int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
+_OVERRIDE = int(mujoco.mjtEnableBit.mjENBL_OVERRIDE)
 
 
 class Coulomb:
@@ -465,13 +466,12 @@ def _check_friction(model: Any) -> None:
 
 def _see_ahead(model: Any) -> None:
     """Widen contact margins to what a body that fell through the scene moves in a step, at most a
-    fifth of its radius.
+    fifth of its radius; where something sticks, to a fall of a step: adhesion acts within them.
 
     Colliders take a body that is smaller than the margin for one that overlaps.
     """
-    ahead = model.opt.timestep * math.sqrt(
-        2 * np.linalg.norm(model.opt.gravity) * model.stat.extent
-    )
+    gravity, h = float(np.linalg.norm(model.opt.gravity)) or EARTH, model.opt.timestep
+    ahead = gravity * h**2 if _sticks(model) else h * math.sqrt(2 * gravity * model.stat.extent)
     most = model.geom_rbound / 5
     np.maximum(model.geom_margin, np.minimum(ahead, most), out=model.geom_margin)
     pairs = [model.pair_geom1, model.pair_geom2]
@@ -480,3 +480,13 @@ def _see_ahead(model: Any) -> None:
         np.minimum(ahead, most[np.array(pairs)].max(axis=0)),
         out=model.pair_margin,
     )
+    if model.opt.enableflags & _OVERRIDE:  # one margin for all contacts
+        least = most.min(where=most > 0, initial=ahead)
+        model.opt.o_margin = max(model.opt.o_margin, least)
+
+
+def _sticks(model: Any) -> bool:
+    """Whether there is adhesion, of bodies by actuators or of geoms and pairs."""
+    of_bodies = (model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_BODY)).any()
+    since_4 = [getattr(model, f"{kind}_adhesion", np.zeros(0)) for kind in ("geom", "pair")]
+    return bool(of_bodies or any(values.any() for values in since_4))

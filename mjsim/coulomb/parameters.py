@@ -79,6 +79,8 @@ NARROW = 1e-3
 """Square of the width of a face, in units of its length, below which its points lie on a line."""
 APART = 1e9
 """Approach that a contact allows which is open, m s-2."""
+EARTH = 9.81
+"""Gravity where there is none, m s-2: the scale of small accelerations."""
 USUAL_STEP = 2e-3
 """MuJoCo's own time step, s."""
 ITERATIONS = 20

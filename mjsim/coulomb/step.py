@@ -41,7 +41,7 @@ from .friction import (
 )
 from .memory import CONTACT_ROW, DRY, contacts_of, memories, rows_of
 from .newton import solve_contacts
-from .parameters import NEXT, OVER, SOFTER
+from .parameters import EARTH, NEXT, OVER, SOFTER
 from .rigid import (
     add_dampers,
     add_gyroscopic_moments,
@@ -227,7 +227,7 @@ def size_of_gravity(model: Any) -> float:
     """The size of gravity, m s-2; the earth's if there is none."""
     g = model.opt.gravity
     size = math.sqrt(g[0] ** 2 + g[1] ** 2 + g[2] ** 2)
-    return size if size > 0 else 9.81
+    return size if size > 0 else EARTH
 
 
 @kernel

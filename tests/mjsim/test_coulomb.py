@@ -698,6 +698,35 @@ def test_kinetic_friction_is_not_taken_twice_from_contacts_that_are_asked_again(
             mujoco.mj_forwardSkip(model, data, mujoco.mjtStage.mjSTAGE_POS, 0)
 
 
+@pytest.mark.parametrize(
+    "option", ['gravity="0 0 0"', '><flag override="enable"/></option><option'], ids=["free", "one"]
+)
+def test_what_lands_without_gravity_or_with_one_margin_for_all_is_seen_ahead(option):
+    body = '<body pos="0 0 .2015"><freejoint/><geom type="box" size=".1 .1 .1" mass="1"/></body>'
+    model = world(FLOOR + body, option)
+    data, law = mujoco.MjData(model), Coulomb(model, rigid=True)
+    data.qvel[2] = -2.0
+    for _ in range(200):
+        law.step(data)
+        assert data.qpos[2] > 0.1 - 1e-5
+    assert np.abs(data.qvel).max() < 1e-6
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.01])
+def test_adhesion_holds_what_touches_and_reaches_no_farther(gap):
+    """A box at a wall, at which 20 N hold its weight; a hundredth beside it falls freely."""
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><worldbody><geom type="box" pos="{0.2 + gap} 0 0" size=".1 1 1" friction=".5"/>'
+        '<body name="box"><freejoint/><geom type="box" size=".1 .1 .1" mass="1" friction=".5"/>'
+        '</body></worldbody><actuator><adhesion body="box" ctrlrange="0 1" gain="20"/></actuator>'
+        "</mujoco>"
+    )
+    data, law = mujoco.MjData(model), Coulomb(model, rigid=True)
+    data.ctrl[:] = 1.0
+    law.step(data, 200)
+    assert data.qvel == pytest.approx([0, 0, -9.81 * 0.4 if gap else 0, 0, 0, 0], abs=1e-12)
+
+
 @pytest.mark.parametrize("away", [0.01, 4e-3, 2e-3, 5e-4])
 def test_a_ball_that_is_hit_next_to_a_cushion_bounces_and_hits_back(away):
     """Each impact follows the other in a step, or within it: one after the other they bounce."""
