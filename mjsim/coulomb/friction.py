@@ -33,11 +33,14 @@ def strengthen(data: Any, memory: Any) -> None:
 
 
 @kernel
-def weaken(model: Any, data: Any, memory: Any, gravity: float) -> None:
+def weaken(model: Any, data: Any, memory: Any) -> None:
     """Give contacts that slide kinetic friction, mu_k = `kinetic` mu; what stops holds by mu
     again."""
     contacts, found = contacts_of(memory), engine_contacts(data.contact, data.ncon)
-    velocity, slowest = reals(data.efc_vel, data.nefc), SLOWEST * gravity * model.opt.timestep
+    velocity, slowest = (
+        reals(data.efc_vel, data.nefc),
+        SLOWEST * memory.gravity * model.opt.timestep,
+    )
     for i in range(memory.contacts):
         contact, square = contacts[i], 0.0
         given = found[contact.index]
@@ -124,13 +127,15 @@ def find_forces(model: Any, data: Any, memory: Any) -> float:
 @kernel
 def learn(memory: Any, contact: Any) -> None:
     """Learn from the slip of a rigid contact how wrong its prediction was, or would have been in a
-    step that was solved."""
+    step that was solved; from a jump, which is in one step alone, nothing."""
     if not memory.law.rigid or contact.state != SLIDES or contact.extrapolated < 0:
-        contact.bias = 0.0
+        contact.bias, contact.missed = 0.0, 0.0
         return
     foreseen = max(contact.extrapolated + contact.bias, 0.0)
     contact.error = max(contact.error, abs(contact.found - foreseen))
-    contact.bias = (contact.bias + contact.found - contact.extrapolated) / 2
+    before, contact.missed = contact.missed, contact.found - contact.extrapolated
+    most = min(abs(before), abs(contact.missed)) if before * contact.missed > 0 else 0.0
+    contact.bias = min(max((contact.bias + contact.missed) / 2, -most), most)
 
 
 @kernel
@@ -191,7 +196,7 @@ def subtract_references(memory: Any) -> None:
 
 
 @kernel
-def predict_slip(model: Any, data: Any, memory: Any, enough: float, gravity: float) -> bool:
+def predict_slip(model: Any, data: Any, memory: Any) -> bool:
     """Predict slip, as if accelerations stayed those of the last step; whether that is in doubt."""
     contacts, rows, doubt = contacts_of(memory), rows_of(memory), False
     rigid, estimate = memory.law.rigid, reals(data.efc_diagA, data.nefc)
@@ -201,18 +206,18 @@ def predict_slip(model: Any, data: Any, memory: Any, enough: float, gravity: flo
         slip, normal = shift(rows, contact), rows[contact.address].residual
         contact.predicted, contact.extrapolated = slip, -1.0
         if contact.state == NEW or contact.state == OPEN:
-            doubt |= normal < 0 and (rigid or slip > enough)
+            doubt |= normal < 0 and (rigid or slip > memory.enough)
             continue
         if contact.state == STICKS or power(rows, contact) >= 0:  # it stops
             contact.predicted = 0.0
-            doubt |= slip > enough and not would_hold(rows, contact, estimate)
+            doubt |= slip > memory.enough and not would_hold(rows, contact, estimate)
         else:
             contact.extrapolated = slip
             contact.predicted = max(slip + contact.bias, 0.0)
             surely = STEADIER if rigid and feedback(contact, estimate) > FEEDBACK else 1.0
-            doubt |= contact.error > enough * surely
+            doubt |= contact.error > memory.enough * surely
         # the force of a rigid contact will change by a weight
-        changes = abs(normal) > gravity or (contact.predicted == 0 and slip > gravity)
+        changes = abs(normal) > memory.gravity or (contact.predicted == 0 and slip > memory.gravity)
         doubt |= rigid and changes
     return doubt
 

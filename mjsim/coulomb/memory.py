@@ -49,7 +49,8 @@ CONTACT = np.dtype(
         ("predicted", _f8),
         ("found", _f8),
         ("extrapolated", _f8),  # as if accelerations stayed those of the last step; -1: not known
-        ("bias", _f8),  # what to add to that: half of its last miss and half of what was added
+        ("missed", _f8),  # by how much that was too little in the last step
+        ("bias", _f8),  # what to add to it: half of that and half of what was added, at most that
         ("error", _f8),  # by how much the prediction was wrong
         # -- of one step alone --
         ("index", _i4),  # its number in mjData
@@ -113,6 +114,8 @@ DOF = np.dtype(
         ("next", _i4),  # the next one of its island; -1: it is the last
         ("unit", _i4),  # of the first one: the first unit of the island
         ("due", _i4),  # of the first one: whether the island is to be solved
+        ("tree", _i4),  # the first one of its kinematic tree
+        ("level", _i4),  # of that one: how many units it is from where numbers of the island begin
         ("place", _i4),  # its number in its island
         ("envelope", _i4),  # where the row of that number begins in the derivative
         ("reach", _i4),  # where it ends in U
@@ -156,6 +159,8 @@ MEMORY = np.dtype(
         # steps that were solved; factorisations that took; steps that didn't reach their tolerance
         *((name, _i8) for name in ("solves", "factorisations", "unsolved")),
         ("active", _i8),  # whether the law applies
+        ("gravity", _f8),  # its size, m s-2
+        ("enough", _f8),  # `share` of it: to which a step must know how contacts slip, m s-2
         ("told", _i8),  # whether mjData was told its rows
         ("braking", _f8),  # time that makes what brakes inertia, s; 0: nothing does, or not so
         ("braked", _i8),  # the last number of M that it has changed, -1: none; what that is now

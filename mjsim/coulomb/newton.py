@@ -129,6 +129,7 @@ def find_islands(model: Any, memory: Any, everywhere: bool) -> None:
     parent = integers(model.dof_parentid, model.nv)
     for i in range(model.nv):
         dofs[i].label = root(dofs, parent[i]) if parent[i] >= 0 else i
+        dofs[i].tree = dofs[parent[i]].tree if parent[i] >= 0 else i
         dofs[i].next, dofs[i].unit, dofs[i].due = -1, -1, everywhere
     for u in range(len(rows)):
         rows[u].dof = -1
@@ -175,14 +176,19 @@ def root(dofs: Any, i: int) -> int:
 
 @kernel
 def find_envelope(model: Any, memory: Any, first: int) -> int:
-    """Number an island's degrees of freedom, and find where rows of its derivative begin and how
-    far they reach; its size."""
+    """Number an island's degrees of freedom, tree by tree, so that rows of its derivative are short
+    (Cuthill and McKee 1969); where they begin, and how far they reach; its size."""
     starts, columns = integers(model.M_rowadr, model.nv), integers(model.M_colind, model.nC)
-    rows, dofs, i, size = rows_of(memory), dofs_of(memory), first, 0
-    while i >= 0:
-        dofs[i].place = size
-        dofs[size].envelope, dofs[size].reach = dofs[columns[starts[i]]].place, size
-        i, size = dofs[i].next, size + 1
+    rows, dofs, size = rows_of(memory), dofs_of(memory), 0
+    last = find_levels(memory, first, find_levels(memory, first, first))
+    for level in range(dofs[last].level, -1, -1):
+        i = first
+        while i >= 0:
+            if dofs[dofs[i].tree].level == level:
+                dofs[i].place = size
+                dofs[size].envelope, dofs[size].reach = dofs[columns[starts[i]]].place, size
+                size += 1
+            i = dofs[i].next
     u = dofs[first].unit
     while u >= 0:
         column, place, least = columns_of(memory, rows[u]), places_of(memory, rows[u]), size
@@ -198,6 +204,27 @@ def find_envelope(model: Any, memory: Any, first: int) -> int:
     for k in range(1, size):
         dofs[k].reach = max(dofs[k].reach, dofs[k - 1].reach)
     return size
+
+
+@kernel
+def find_levels(memory: Any, first: int, start: int) -> int:
+    """How many units the trees of an island are from the one that starts there; one of the
+    farthest."""
+    rows, dofs, i, last, level = rows_of(memory), dofs_of(memory), first, start, 0
+    while i >= 0:
+        dofs[i].level, i = -1, dofs[i].next
+    dofs[start].level = 0
+    while dofs[last].level == level:
+        u, level = dofs[first].unit, level + 1
+        while u >= 0:
+            column, near = columns_of(memory, rows[u]), False
+            for c in column:
+                near = near or dofs[dofs[c].tree].level == level - 1
+            for c in column:
+                if near and dofs[dofs[c].tree].level < 0:
+                    dofs[dofs[c].tree].level, last = level, dofs[c].tree
+            u = rows[u].next
+    return last
 
 
 @kernel
@@ -389,11 +416,11 @@ def hold_forces(memory: Any, first: int) -> float:
 
 
 @kernel
-def solve_contacts(model: Any, data: Any, memory: Any, a: Any, enough: float) -> bool:
+def solve_contacts(model: Any, data: Any, memory: Any, a: Any) -> bool:
     """Solve for the accelerations `a` with contacts that close, until none closes that was open.
 
-    `enough`: acceleration by which R may make contacts give way, m s-2. Slip that is predicted, and
-    forces that are held, are those that it comes to. Returns whether it came to an end.
+    Slip that is predicted, and forces that are held, are those that it comes to. Returns whether it
+    came to an end.
     """
     contacts, rows = contacts_of(memory), rows_of(memory)
     find_residuals(memory, a)
@@ -401,7 +428,7 @@ def solve_contacts(model: Any, data: Any, memory: Any, a: Any, enough: float) ->
         contact, normal = contacts[k], rows[contacts[k].address]
         contact.state = STICKS if normal.residual < 0 or normal.held > 0 else OPEN
     for n in range(memory.law.most):
-        if not solve_closed(model, data, memory, a, enough, n == 0):
+        if not solve_closed(model, data, memory, a, n == 0):
             return False
         find_residuals(memory, a)
         some = False
@@ -428,9 +455,7 @@ def find_residuals(memory: Any, a: Any) -> None:
 
 
 @kernel
-def solve_closed(
-    model: Any, data: Any, memory: Any, a: Any, enough: float, everywhere: bool
-) -> bool:
+def solve_closed(model: Any, data: Any, memory: Any, a: Any, everywhere: bool) -> bool:
     """Solve for the accelerations of islands of closed contacts, `everywhere` or where one has just
     closed; whether all came to an end."""
     find_units(memory)
@@ -438,15 +463,13 @@ def solve_closed(
     dofs = dofs_of(memory)
     for first in range(model.nv):
         due = dofs[first].label == first and dofs[first].due
-        if due and not solve_rigid_island(model, data, memory, first, a, enough):
+        if due and not solve_rigid_island(model, data, memory, first, a):
             return False
     return True
 
 
 @kernel
-def solve_rigid_island(
-    model: Any, data: Any, memory: Any, first: int, a: Any, enough: float
-) -> bool:
+def solve_rigid_island(model: Any, data: Any, memory: Any, first: int, a: Any) -> bool:
     """Solve an island until R makes its contacts give way no more, m s-2: proximal point method.
 
     R falls from solution to solution, so that they come near sooner (Rockafellar 1976); it grows
@@ -455,7 +478,7 @@ def solve_rigid_island(
     gives_way, last, scale, solved, least = math.inf, math.inf, R_RISES, True, False
     multiply_R(memory, first, scale)
     for _ in range(memory.law.most):
-        if least and solved and gives_way <= enough and gives_way >= FALLING * last:
+        if least and solved and gives_way <= memory.enough and gives_way >= FALLING * last:
             break
         least |= scale <= R_LEAST
         solved = solve_island(model, data, memory, first, a, EXACT if least else ROUGH)
@@ -463,12 +486,12 @@ def solve_rigid_island(
         if solved:
             last, gives_way = gives_way, hold_forces(memory, first)
             factor = R_LEAST / scale
-            if gives_way > NEAR * enough:
+            if gives_way > NEAR * memory.enough:
                 factor = max(R_FALLS, factor)
         scale *= factor
         multiply_R(memory, first, factor)
     multiply_R(memory, first, 1 / scale)
-    return solved and gives_way <= enough
+    return solved and gives_way <= memory.enough
 
 
 @kernel

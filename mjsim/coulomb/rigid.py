@@ -27,7 +27,7 @@ FREE, SLIDE = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 
 
 @kernel
-def stiffen(model: Any, data: Any, memory: Any, gravity: float) -> None:
+def stiffen(model: Any, data: Any, memory: Any) -> None:
     """Make contacts stiff, and let them ask for velocities at the end of the step."""
     contacts, rows, law, h = contacts_of(memory), rows_of(memory), memory.law, model.opt.timestep
     estimate, velocity = reals(data.efc_diagA, data.nefc), reals(data.efc_vel, data.nefc)
@@ -36,13 +36,13 @@ def stiffen(model: Any, data: Any, memory: Any, gravity: float) -> None:
     for i in range(memory.contacts):
         contact = contacts[i]
         normal, first = rows[contact.address], contact.address
-        stuck = estimate[first] * normal.remembered > STUCK * gravity
-        fastest = math.inf if is_moved_by_hand(model, contact) else h * gravity
+        stuck = estimate[first] * normal.remembered > STUCK * memory.gravity
+        fastest = math.inf if is_moved_by_hand(model, contact) else h * memory.gravity
         goal = velocity_to_ask_for(model, memory, contact, 0.0 if stuck else fastest)
         share = restitution_of(memory, contact) if memory.bounces else 0.0
         if share > 0:
             speed, fall = velocity[first], h * max(-times(memory, normal, free), 0.0)
-            parts = speed > BOUNCES * h * gravity
+            parts = speed > BOUNCES * h * memory.gravity
             comes = contact.load == 0 and contact.gap + h * (speed - fall) > 0
             # what an impact makes touch, or touch again, bounces in the next step
             bounce = rebound(share, contact.gap, speed, fall, h)
@@ -196,7 +196,7 @@ def take_depth_away(model: Any, data: Any, memory: Any) -> None:
 
 
 @kernel
-def oppose_slip_at_mid_step(model: Any, data: Any, memory: Any, gravity: float) -> bool:
+def oppose_slip_at_mid_step(model: Any, data: Any, memory: Any) -> bool:
     """Let friction of what slides fast oppose its slip at mid step; whether there is any.
 
     That is of second order, by the Jacobian of where bodies are: velocities lie half a step to
@@ -208,7 +208,7 @@ def oppose_slip_at_mid_step(model: Any, data: Any, memory: Any, gravity: float) 
     for i in range(memory.contacts):
         contact = contacts[i]
         gained = rows[contact.address].remembered - contact.load
-        impact = abs(gained) * estimate[contact.address] > gravity
+        impact = abs(gained) * estimate[contact.address] > memory.gravity
         if contact.state != SLIDES or contact.predicted == 0 or impact:
             continue
         speed, change = 0.0, 0.0

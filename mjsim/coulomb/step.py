@@ -92,13 +92,13 @@ def law_of_a_step(m: int, d: int, at: int) -> None:
     memory.pending = memory.contacts + memory.dry > 0
     if not memory.pending:
         return
-    gravity = size_of_gravity(model)
-    enough = memory.law.share * gravity
-    find_references(model, data, memory, gravity, since if known and moved else 0.0)
-    if predict_slip(model, data, memory, enough, gravity) or not known:
-        solve(model, data, memory, enough, gravity, known)
+    memory.gravity = size_of_gravity(model)
+    memory.enough = memory.law.share * memory.gravity
+    find_references(model, data, memory, since if known and moved else 0.0)
+    if predict_slip(model, data, memory) or not known:
+        solve(model, data, memory, known)
     elif rigid:
-        oppose_slip_at_mid_step(model, data, memory, gravity)
+        oppose_slip_at_mid_step(model, data, memory)
     if rigid:
         share_softness(data, memory)
     write_references(data, memory)
@@ -126,17 +126,17 @@ def update_contacts(
 
 
 @kernel
-def find_references(model: Any, data: Any, memory: Any, gravity: float, since: float) -> None:
+def find_references(model: Any, data: Any, memory: Any, since: float) -> None:
     """Find what rows ask for: MuJoCo's references are mended in mjData, and then read.
 
     `since`: for how long contacts have turned along with their bodies, s; 0: they haven't.
     """
     read_rows(data, memory)
     if memory.law.kinetic < 1:
-        weaken(model, data, memory, gravity)
+        weaken(model, data, memory)
     multiply(memory, reals(data.qacc, model.nv))
     if memory.law.rigid:
-        stiffen(model, data, memory, gravity)
+        stiffen(model, data, memory)
     elif memory.law.servo:
         take_depth_away(model, data, memory)
     if since > 0:
@@ -231,8 +231,8 @@ def size_of_gravity(model: Any) -> float:
 
 
 @kernel
-def solve(model: Any, data: Any, memory: Any, enough: float, gravity: float, known: bool) -> None:
-    """Solve the step, until contacts slip as predicted, to `enough`, m s-2.
+def solve(model: Any, data: Any, memory: Any, known: bool) -> None:
+    """Solve the step, until contacts slip as predicted.
 
     Newton's method does so of rigid contacts. Where it comes to no end, and of soft contacts,
     MuJoCo solves for the slip that it found last.
@@ -244,31 +244,29 @@ def solve(model: Any, data: Any, memory: Any, enough: float, gravity: float, kno
     solved = False
     if memory.law.rigid:
         if not known:  # loads that contacts can bear in many ways are shared as MuJoCo has it
-            iterate(model, data, memory, start, enough)
-        solved = solve_rigid(model, data, memory, start, enough, gravity)
+            iterate(model, data, memory, start)
+        solved = solve_rigid(model, data, memory, start)
     if not solved:
-        solved = iterate(model, data, memory, start, enough)
+        solved = iterate(model, data, memory, start)
     memory.unsolved += not solved
 
 
 @kernel
-def solve_rigid(
-    model: Any, data: Any, memory: Any, start: Any, enough: float, gravity: float
-) -> bool:
+def solve_rigid(model: Any, data: Any, memory: Any, start: Any) -> bool:
     """Find slip and forces by Newton's method; friction at mid step asks for a solution more, once
     it is known what slips."""
     soften(memory)
-    solved = solve_contacts(model, data, memory, start, enough)
+    solved = solve_contacts(model, data, memory, start)
     multiply(memory, start)
     subtract_references(memory)
-    if oppose_slip_at_mid_step(model, data, memory, gravity):
-        solved &= solve_contacts(model, data, memory, start, enough)
+    if oppose_slip_at_mid_step(model, data, memory):
+        solved &= solve_contacts(model, data, memory, start)
     foresee(model, data, memory)
     return bool(solved)
 
 
 @kernel
-def iterate(model: Any, data: Any, memory: Any, start: Any, enough: float) -> bool:
+def iterate(model: Any, data: Any, memory: Any, start: Any) -> bool:
     """Let MuJoCo solve for the slip that was found last, until it is found again; rigid contacts
     hold the forces that were."""
     contacts, rows = contacts_of(memory), rows_of(memory)
@@ -286,7 +284,7 @@ def iterate(model: Any, data: Any, memory: Any, start: Any, enough: float) -> bo
             contact.predicted, contact.extrapolated = contact.found, -1.0
             for r in range(contact.address, contact.address + contact.dim * memory.law.rigid):
                 rows[r].held = rows[r].remembered = rows[r].force
-        if worst <= enough:
+        if worst <= memory.enough:
             return True
     return False
 
