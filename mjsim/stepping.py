@@ -34,7 +34,7 @@ _SLOW, _LEAST, _AFTER = 32.0, 3e-2, 32
 """Slip, in units of its change in a step, up to which steps after a landing are divided, too: where
 slip is slow, friction turns fast; the least change, in units of a fall in a step; for how many
 steps. (Chosen after balls that hop had been seen.)"""
-SHARE = 1e-5
+SHARE = 1e-6
 """`share` of the law: part of gravity to which the slip of contacts must be predicted."""
 _NORMAL_A, _NORMAL_B = range(NSENSOR)[recorder.NORMALS]
 _SLIP_A, _, _SLIP_B, _ = recorder.SLIPS

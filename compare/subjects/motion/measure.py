@@ -89,7 +89,7 @@ class ContactLaw(NamedTuple):
 
 LOADS_FOUND = 1e-7
 """Part of a weight, or of gravity, to which a law of rigid contacts finds what they bear in a
-motion: a hundredth of its share. (Chosen after a measurement.)"""
+motion: a tenth of its share. (Chosen after a measurement.)"""
 
 
 def laws(runner: Runner, sets: Sets, records: Records) -> Measured:
