@@ -306,13 +306,16 @@ def _values(
     # and what it changes comes from the rates of other variables.
     slips = [k for k in range(8)[SLIP_XYZ] if VARIABLES[k] in TRAITS[case].constraints]
     rolling = float(np.abs(rows[0, 8:16] / scales)[slips].max(initial=0.0))
+    # friction of a load that is wrong changes slip so much more than speed
+    by_friction = max(1.0, max(p.mu, p.eta) * (1 + 1 / p.j))
     values = {}
     for k, (name, (of, size)) in enumerate(read_off.items()):
         causes = {"rolling": uniform(rolling)} if name.startswith("rate") else {}
+        more = by_friction if name.startswith("rate_slip") else 1.0
         causes |= {
             "time_step": uniform(float(steps[k])),
             "degree": uniform(float(degrees[k])),
-            "solver": uniform(LOADS_FOUND),
+            "solver": uniform(LOADS_FOUND * more),
         }
         values[name] = estimate(of[0], size, **causes)
     return constrained(case, rows[0, :8], p), values
