@@ -135,10 +135,12 @@ def _slope(curve: Curve, states: Sequence[SteadyState]) -> Estimate | None:
     if curve.by == "jump" and cases[1:3] == [Case.RR, Case.SS]:
         secants, middles = np.diff(w[2:]) / np.diff(f[2:]), (f[2:-1] + f[3:]) / 2 - onset
         cubic, parabola = np.polyfit(middles, secants, 3), np.polyfit(middles[:3], secants[:3], 2)
-        # Noise of the states, propagated to the secants and from them to the slope: no weight in
-        # the cubic exceeds 4.
-        solved, placed = 4 * math.sqrt(2) * noise / (f[3] - f[2]), abs(parabola[-2] * curve.noise)
+        # noise of the states, propagated to the secants and from them to the slope
+        to_secants = np.diff(np.eye(len(f) - 2), axis=0) / np.diff(f[2:])[:, None]
+        weights = np.linalg.inv(np.vander(middles))[-1] @ to_secants
+        solved = math.hypot(*weights * noises[2:], *noises[:2] / (f[1] - f[0]))
         bent = uniform(abs(float(cubic[-1] - parabola[-1])))
+        placed = abs(parabola[-2] * curve.noise)
         return estimate(cubic[-1] - below, degree=bent, states=solved, threshold=placed)
     if curve.by == "mean" and cases == [Case.RR, Case.RR, Case.SS]:
         first, rise = w[1] + (onset - f[1]) * (w[1] - w[0]) / (f[1] - f[0]), f[2] - onset
