@@ -22,8 +22,8 @@ from .step import TABLE, serve, table
 
 _SLOT = ctypes.c_void_p.in_dll(LIBRARY, "mjcb_control")
 
-_Switched = tuple[float, Callable[[], None]]
-"""Time that makes what brakes inertia, s; what puts a model's options back."""
+_Switched = tuple[bool, Callable[[], None]]
+"""Whether what brakes is made inertia; what puts a model's options back."""
 
 
 class Callback:
@@ -33,7 +33,7 @@ class Callback:
         self._lock, self._users = threading.RLock(), 0
         self._before: int | None = None  # the callback that was there, by its address
         # by model: its users, whether they are rigid, and what `set` was given
-        self._options: dict[int, tuple[int, bool, float, Callable[[], None]]] = {}
+        self._options: dict[int, tuple[int, bool, bool, Callable[[], None]]] = {}
         self._simulations: dict[int, Simulation] = {}
         self._installed: dict[int, Callable[[int], Simulation]] = {}
         self._ask = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)(self._adopt)
@@ -109,10 +109,10 @@ class Callback:
             self._publish()
             return bool(_SLOT.value == _served())
 
-    def set(self, model: Any, rigid: bool, switch: Callable[[], _Switched]) -> float:
+    def set(self, model: Any, rigid: bool, switch: Callable[[], _Switched]) -> bool:
         """Set MuJoCo's callback, unless it is set; the first user of a model switches its options.
 
-        Returns the time that makes what brakes inertia, s.
+        Returns whether what brakes is made inertia.
 
         Raises
         ------
@@ -135,9 +135,9 @@ class Callback:
                 _SLOT.value = _served()
             return braking
 
-    def braking(self, model: int) -> float:
-        """Time that makes what brakes in a model inertia, s."""
-        return self._options[model][2] if model in self._options else 0.0
+    def braking(self, model: int) -> bool:
+        """Whether what brakes in a model is made inertia."""
+        return model in self._options and self._options[model][2]
 
     def unset(self, model: Any) -> None:
         """Put back options after their last user, and the callback, unless another one was set."""

@@ -336,7 +336,7 @@ class Coulomb:
         simulation.active[0] = active
         CALLBACK.unset(self.model)
 
-    def _switch(self) -> tuple[float, Callable[[], None]]:
+    def _switch(self) -> tuple[bool, Callable[[], None]]:
         """Switch the model to options under which the law acts.
 
         Rigid contacts ask for velocities after a step, so they must know of what brakes:
@@ -345,17 +345,16 @@ class Coulomb:
 
         Returns
         -------
-        time that makes what brakes inertia, s; what puts options back
+        whether what brakes is made inertia; what puts options back
         """
         option = self.model.opt
         cone, integrator, flags = option.cone, option.integrator, option.disableflags
-        accuracy, solver, braking = option.ccd_tolerance, option.solver, 0.0
+        accuracy, solver, braking = option.ccd_tolerance, option.solver, False
         option.cone = _ELLIPTIC
         # from no force PGS only tries a normal one, which De Saxcé's shift keeps at none
         option.solver = _NEWTON if solver == _PGS else solver
         if self._law.rigid:
-            if integrator != _EULER or not flags & _NO_DAMPING:
-                braking = float(option.timestep)
+            braking = integrator != _EULER or not flags & _NO_DAMPING
             option.integrator, option.disableflags = _EULER, flags | _NO_DAMPING
             # what lies on a smooth side rolls off if its point is a micrometre beside it
             option.ccd_tolerance = min(accuracy, CCD_TOLERANCE)
@@ -488,5 +487,5 @@ def _see_ahead(model: Any) -> None:
 def _sticks(model: Any) -> bool:
     """Whether there is adhesion, of bodies by actuators or of geoms and pairs."""
     of_bodies = (model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_BODY)).any()
-    since_4 = [getattr(model, f"{kind}_adhesion", np.zeros(0)) for kind in ("geom", "pair")]
-    return bool(of_bodies or any(values.any() for values in since_4))
+    since_4 = [getattr(model, name, None) for name in ("geom_adhesion", "pair_adhesion")]
+    return bool(of_bodies or any(np.any(values) for values in since_4 if values is not None))

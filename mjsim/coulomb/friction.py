@@ -37,10 +37,8 @@ def weaken(model: Any, data: Any, memory: Any) -> None:
     """Give contacts that slide kinetic friction, mu_k = `kinetic` mu; what stops holds by mu
     again."""
     contacts, found = contacts_of(memory), engine_contacts(data.contact, data.ncon)
-    velocity, slowest = (
-        reals(data.efc_vel, data.nefc),
-        SLOWEST * memory.gravity * model.opt.timestep,
-    )
+    velocity = reals(data.efc_vel, data.nefc)
+    slowest = SLOWEST * memory.gravity * model.opt.timestep
     for i in range(memory.contacts):
         contact, square = contacts[i], 0.0
         given = found[contact.index]

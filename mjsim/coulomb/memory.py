@@ -162,7 +162,7 @@ MEMORY = np.dtype(
         ("gravity", _f8),  # its size, m s-2
         ("enough", _f8),  # `share` of it: to which a step must know how contacts slip, m s-2
         ("told", _i8),  # whether mjData was told its rows
-        ("braking", _f8),  # time that makes what brakes inertia, s; 0: nothing does, or not so
+        ("braking", _i8),  # whether what brakes is made inertia
         ("braked", _i8),  # the last number of M that it has changed, -1: none; what that is now
         ("braked_is", _f8),
         *((f"room_{name}", _i8) for name in ("contacts", "rows", "jacobian")),

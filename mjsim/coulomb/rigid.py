@@ -46,7 +46,7 @@ def stiffen(model: Any, data: Any, memory: Any) -> None:
             comes = contact.load == 0 and contact.gap + h * (speed - fall) > 0
             # what an impact makes touch, or touch again, bounces in the next step
             bounce = rebound(share, contact.gap, speed, fall, h)
-            goal = -APART if parts or comes else max(goal, bounce)
+            goal = -APART * h if parts or comes else max(goal, bounce)
         factor = law.softness * estimate[first] / R[first]
         for r in range(first, first + contact.dim):
             R[r] *= factor
@@ -246,7 +246,7 @@ def add_dampers(model: Any, data: Any, memory: Any) -> None:
     inertia, free = reals(data.M, model.nC), reals(memory.inertia_at, model.nC)
     for k in range(model.nC):
         free[k] = inertia[k]
-        inertia[k] -= memory.braking * derivative[place[k]]
+        inertia[k] -= model.opt.timestep * derivative[place[k]]
         if inertia[k] != free[k]:
             memory.braked, memory.braked_is = k, inertia[k]
     if memory.braked >= 0:

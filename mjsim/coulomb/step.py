@@ -83,7 +83,7 @@ def law_of_a_step(m: int, d: int, at: int) -> None:
     if data.ncon == 0 and not rigid:  # nothing touches: all is MuJoCo's own
         forget_contacts(memory)
         return
-    if memory.braking > 0:
+    if memory.braking:
         add_dampers(model, data, memory)
     moved = not known or not nothing_moved(model, data, memory)
     update_contacts(model, data, memory, known, over, moved)
