@@ -127,6 +127,16 @@ def of_no_step(coarse: float, fine: Estimate) -> Estimate:
     )
 
 
+def of_no_order(coarse: float, fine: Estimate) -> Estimate:
+    """What is off in no clear order of the step, from the values with a step and with half of it:
+    as uncertain as the difference.
+
+    Balls that hop land at any part of a step, and peaks of small differences show what contacts
+    forget from step to step. (A limit was sought beyond both, until orbits of the default level had
+    been seen 3.2 uncertainties off, and a blind round had raised a false alarm by a peak.)"""
+    return fine.also(time_step=abs(fine.value - coarse))
+
+
 def of_three_steps(values: Array) -> tuple[Array, Array]:
     """Limits (n,) of a vanishing step of values (3, n) with a step, half of it, and a quarter,
     in two ways, each (n,).

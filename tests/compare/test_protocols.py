@@ -35,7 +35,14 @@ from compare.kit.statistics import (
     uniform,
     zero_and_slope,
 )
-from compare.kit.step_pairs import Start, lag_error, of_no_step, of_three_steps, unlike
+from compare.kit.step_pairs import (
+    Start,
+    lag_error,
+    of_no_order,
+    of_no_step,
+    of_three_steps,
+    unlike,
+)
 from compare.subjects.attractors import measure as attractors
 from compare.subjects.flowmeter import measure as flowmeter
 from compare.subjects.motion import measure as moving
@@ -680,7 +687,7 @@ def test_a_ball_leaves_the_floor_where_it_does_however_it_shared_its_load(runner
 
 
 @pytest.mark.parametrize("coarse", [3.0, 2.5, 0.5])
-def test_what_hops_show_is_sure_however_their_errors_fall(coarse):
+def test_what_has_no_clear_order_is_sure_however_its_errors_fall(coarse):
     """By the first order, by less, or to the other side."""
-    shown = attractors.of_hops(coarse, Estimate(2.0, 0.0))
+    shown = of_no_order(coarse, Estimate(2.0, 0.0))
     assert shown.value == pytest.approx(1.0, abs=COVERAGE * shown.uncertainty)

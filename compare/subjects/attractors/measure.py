@@ -33,7 +33,14 @@ from compare.kit.runner import Runner, coarse_step
 from compare.kit.scales import time_unit
 from compare.kit.settling import settled_readings
 from compare.kit.statistics import Estimate, estimate, hops, peaks, settled_case, tail, top
-from compare.kit.step_pairs import Start, StepPair, carry_out, constrained, of_no_step
+from compare.kit.step_pairs import (
+    Start,
+    StepPair,
+    carry_out,
+    constrained,
+    of_no_order,
+    of_no_step,
+)
 from compare.kit.sweep import sobol
 from compare.kit.tasks import Task
 from model import Case, Flow, Parameters, State, Trajectory
@@ -104,12 +111,12 @@ def _hopping(runner: Runner, shares: Sequence[float], divisors: tuple[int, int])
             break
         row = partial(runner.measurement, SET, q, tasks=result.tasks, **fine.conditions(q))
         for quantity, value in fine.values.items():
-            yield row(quantity=quantity, value=of_hops(coarse.values[quantity].value, value))
+            yield row(quantity=quantity, value=of_no_order(coarse.values[quantity].value, value))
         if k:
             begin, last = k * HOLD + DISTURBED, end - MEASURED
             parts = (result.coarse, begin), (result.fine, begin), (result.fine, begin + DISTURBED)
             slow, fast, later = (hop_map(tops(run, start, last).x, q)[0] for run, start in parts)
-            factor = of_hops(slow, estimate(fast, part=abs(fast - later)))
+            factor = of_no_order(slow, estimate(fast, part=abs(fast - later)))
             why = f"no disturbance is seen to shrink at omega_0 = {omega_0:.4g} rad/s"
             yield if_found(row(quantity="orbit_multiplier", value=factor), why)
         heights.append([hops.values["orbit_height"].value for hops in (coarse, fine)])
@@ -118,15 +125,6 @@ def _hopping(runner: Runner, shares: Sequence[float], divisors: tuple[int, int])
             birth(flows[: len(heights)], each) for each in zip(*heights, strict=True)
         )
         yield result.row("orbit_birth", of_no_step(coarse_birth.value, fine_birth))
-
-
-def of_hops(coarse: float, fine: Estimate) -> Estimate:
-    """What hops show, from the values with a step and with half of it.
-
-    Balls land at any part of a step, so that errors are of first order in the mean, and of no clear
-    order beside it: the value with half the step is as uncertain as the difference. (A limit was
-    sought beyond it, until orbits of the default level had been seen 3.2 uncertainties off.)"""
-    return fine.also(time_step=abs(fine.value - coarse))
 
 
 def with_groups(p: Parameters, kappa: float, Omega_0: float, **others: float) -> Parameters:

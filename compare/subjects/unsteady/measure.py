@@ -38,6 +38,7 @@ from compare.kit.step_pairs import (
     StepPairResult,
     carry_out,
     constrained,
+    of_no_order,
     of_no_step,
 )
 from compare.kit.tasks import Task
@@ -408,8 +409,10 @@ def _rows(result: StepPairResult) -> Measured:
     """Measurements of a pair of jumps, or of a ramp."""
     pair, coarse, fine = result.pair, result.coarse, result.fine
     if pair.flow is None:
-        for quantity in ("jump_delay",) if pair.name == "RR" else ("jump_peak", "jump_height"):
-            row = result.row(quantity, of_no_step(coarse[quantity].value, fine[quantity]))
+        rolls = pair.name == "RR"
+        limit = of_no_step if rolls else of_no_order
+        for quantity in ("jump_delay",) if rolls else ("jump_peak", "jump_height"):
+            row = result.row(quantity, limit(coarse[quantity].value, fine[quantity]))
             yield if_found(row, f"{quantity} in {pair.name}: no peak")
     elif math.isfinite(coarse) and math.isfinite(fine):
         yield result.row("ramp_end", of_no_step(coarse, estimate(fine)))
