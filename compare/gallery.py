@@ -135,9 +135,10 @@ def _told_of(every: Checks, checks: Checks, engines: Sequence[str]) -> str:
     return (
         "By how much what was measured differs from what is predicted, in parts of the tolerance: "
         f"{told} ({f'{len(sets)} parameter sets' if len(sets) > 1 else alone}), a strip for each "
-        "quantity, and in it one for each engine. Shaded: within tolerance, three standard "
-        "uncertainties; darker: within one; red: not as predicted. What is less than "
-        f"{_FRAME[0]:g} or more than {_FRAME[1]:g} stands at the edge."
+        "quantity, and in it one for each engine. Shaded: within tolerance, "
+        f"{checks[0].coverage:.1f} standard uncertainties of the numbers of {engines[0]}; darker: "
+        f"within one; red: not as predicted. What is less than {_FRAME[0]:g} or more than "
+        f"{_FRAME[1]:g} stands at the edge."
     )
 
 

@@ -208,8 +208,8 @@ def find_envelope(model: Any, memory: Any, first: int) -> int:
 
 @kernel
 def find_levels(memory: Any, first: int, start: int) -> int:
-    """How many units the trees of an island are from the one that starts there; one of the
-    farthest."""
+    """Find how many units each tree of an island is away from the one that starts there; return one
+    of the farthest."""
     rows, dofs, i, last, level = rows_of(memory), dofs_of(memory), first, start, 0
     while i >= 0:
         dofs[i].level, i = -1, dofs[i].next

@@ -200,8 +200,8 @@ def oppose_slip_at_mid_step(model: Any, data: Any, memory: Any) -> bool:
     """Let friction of what slides fast oppose its slip at mid step; whether there is any.
 
     That is of second order, by the Jacobian of where bodies are: velocities lie half a step to
-    either side. Where slip may end within the step, it must oppose that at the end, and
-    in an impact, where a load changes by more than a weight, that after it (Moreau).
+    either side. Where slip may end within the step, it must oppose that at the end, and in an
+    impact, where a load changes by more than a weight, that after it (Moreau).
     """
     contacts, rows, h, some = contacts_of(memory), rows_of(memory), model.opt.timestep, False
     velocity, estimate = reals(data.efc_vel, data.nefc), reals(data.efc_diagA, data.nefc)
