@@ -249,8 +249,7 @@ def symbols(app: Sphinx, tree: nodes.document) -> None:
         up, shown = text.parent, typeset(text.astext())
         while up and not isinstance(up, _AS_IT_IS):
             up = up.parent
-        # R is a program there
-        if up is None and "<" in shown and "rhdf5" not in text.parent.astext():
+        if up is None and "<" in shown:
             text.parent.replace(text, nodes.raw("", shown, format="html"))
 
 

@@ -158,7 +158,7 @@ def test_every_number_is_on_the_page():
     assert columns["mark"] == ["fail", "fail", ""]
     assert columns["quantity"] == ["ω_c rad/s"] * 2 + ["case"]
     packed = json.loads(zlib.decompress(base64.b64decode(report.packed(columns))))
-    assert packed.pop("typeset")["ω_c rad/s"] == "<i>ω</i><sub>c</sub> rad/s"
+    assert packed.pop("typeset")["ω_c rad/s"] == "ω<sub>c</sub> rad/s"
     assert packed == columns
 
 
@@ -375,24 +375,16 @@ def test_conditions_are_said_with_their_units_and_a_state_without_what_is_zero()
 @pytest.mark.parametrize(
     ("text", "shown"),
     [
-        ("ω̃_x, ω₀₂ > A_z", "<i>ω̃</i><sub>x</sub>, <i>ω</i><sub>02</sub> &gt; <i>A</i><sub>z</sub>"),
-        ("(g - Rω₀²)/c", "(<i>g</i> − <i>R</i><i>ω</i><sub>0</sub>²)/<i>c</i>"),
-        (
-            "r = 0.2 m, 8πρ_fνr/(jm)",
-            "<i>r</i> = 0.2 m, 8<i>π</i><i>ρ</i><sub>f</sub><i>ν</i><i>r</i>/(<i>jm</i>)",
-        ),
-        (
-            "y = -3 m, it doesn't, K ρ^(2/3)",
-            "<i>y</i> = −3 m, it doesn&#39;t, <i>K</i> <i>ρ</i><sup>2/3</sup>",
-        ),
+        ("ω̃_x, ω₀₂ > A_z, v_y", "ω̃<sub>x</sub>, ω₀₂ &gt; A<sub>z</sub>, v<sub>y</sub>"),
+        ("(g - Rω₀²)/c, 8πρ_fνr/(jm)", "(g − Rω₀²)/c, 8πρ<sub>f</sub>νr/(jm)"),
+        ("y = -3 m, it doesn't, K ρ^(2/3)", "y = −3 m, it doesn&#39;t, K ρ<sup>2/3</sup>"),
         (
             "slip_x of run_of(m), test_j, RR, kg/m³, 2 cm",
             "slip_x of run_of(m), test_j, RR, kg/m³, 2 cm",
         ),
-        ("it rolls (R); A. R. Champneys", "it rolls (R); A. R. Champneys"),
     ],
 )
-def test_symbols_are_typeset_and_names_of_programs_are_not(text, shown):
+def test_indices_are_set_below_and_names_of_programs_are_not(text, shown):
     assert typeset(text) == shown
 
 
@@ -414,9 +406,9 @@ def test_series_and_scales_are_in_the_picture_and_letters_are_shared():
     assert plain("$\\Omega_0 = \\omega_0\\sqrt{R/g}$") == "Ω_0 = ω_0√(R/g)"
     series = re.findall('data-series="([^"]*)"', text)
     assert series.count("a line") == 1
-    assert series.count("&lt;i&gt;ω&lt;/i&gt;&lt;sub&gt;0&lt;/sub&gt; marks") == 2  # and bars
+    assert series.count("ω&lt;sub&gt;0&lt;/sub&gt; marks") == 2  # and bars
     (axes,) = re.findall('data-axes="([^"]*)"', text)
-    assert "&lt;i&gt;ω&lt;/i&gt;&lt;sub&gt;0&lt;/sub&gt; (rad/s)" in axes
+    assert "ω&lt;sub&gt;0&lt;/sub&gt; (rad/s)" in axes
     ElementTree.fromstring(text)
     figure = Figure(figsize=(2, 2))
     figure.add_subplot().plot(range(30), range(30), "o", label="many")

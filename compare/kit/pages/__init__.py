@@ -75,42 +75,22 @@ def _is_greek(letter: str) -> bool:
     return unicodedata.name(letter, "").startswith("GREEK") if letter else False
 
 
-_SYMBOL = r"""
-  (?P<letter> (?: [Α-ω] | (?<![\w.])[A-Za-z] )\u0303? )   # ω_c, B_x, ω̃_x, ω₀: a letter and index,
-  (?: _(?P<index>[A-Za-z0-9]{1,3}) (?![A-Za-z0-9_(])     # as names of programs, slip_x, are not
-    | (?P<digits>[₀-₉]+) )
-| (?P<alone>
-    [Α-ω] (?! [ms]\b | [a-z]{2} )                        # μ; not μm, nor a word
-  | (?<![A-Za-z_.'’]) (?<!\d\ ) (?<![A-Z]\.\ )           # jm, gR; not 2 cm, nor A. R. Champneys,
-    (?! RR | cm | (?<=\()R\) | m(?![gRrcjΑ-ω·]|\ =) )    # nor cases, nor metres
-    [mgRrcj]+ (?![A-Za-z'’_])
-  | (?<![\w.'’]) (?<!\d\ ) (?<!&\#39;)                   # not the t of don't, nor 2 h
-    (?: [yht](?![\w'’.]) | [A-Za-z](?=\ [=&≤≥])          # y; z = 0, with < and > as &lt; and &gt;
-      | [A-Ca-ce-z](?=[Α-ω]) | K(?=\ [Α-ω]) ) )           # iω₀, K ρ
-| \^\(?(?P<power>[\d/]+)\)?                              # ρ^(2/3)
-| (?P<minus> (?<=\ )-(?=\ ) | (?<![\w).])-(?=\d) )
-"""
-"""What is a symbol in a text of a page, which is escaped, and not a word, a unit, or a name of
-programs. The texts have no marks of their own: terminals, JSON, CSV and the sources of the pages
-show them as they are."""
+_SIGNS_OF_PAGES = {
+    # ω_c, B_x, jω_c: a letter and index; names of programs, slip_x, stay as they are
+    r"([Α-ω]\u0303?|(?<![\w.])[A-Za-z])_([A-Za-z0-9]{1,3})(?![A-Za-z0-9_(])": r"\1<sub>\2</sub>",
+    r"\^\(?([\d/]+)\)?": r"<sup>\1</sup>",  # ρ^(2/3)
+    r"(?<= )-(?= )|(?<![\w).])-(?=\d)": "−",
+}
 
 
 def typeset(text: str) -> str:
-    """Text of a page in HTML, with symbols such as ω_c, ω₀ or η as mathematics."""
+    """Text of a page in HTML: indices and powers in their places, and minus signs."""
     import markupsafe  # comes with jinja2
 
-    def symbol(found: re.Match[str]) -> str:
-        of = found.groupdict("")
-        if of["letter"]:
-            index = of["index"] or unicodedata.normalize("NFKC", of["digits"])
-            return f"<i>{of['letter']}</i><sub>{index}</sub>"
-        if of["power"]:
-            return f"<sup>{of['power']}</sup>"
-        return f"<i>{of['alone']}</i>" if of["alone"] else "−"
-
-    return markupsafe.Markup(
-        re.sub(_SYMBOL, symbol, str(markupsafe.escape(text)), flags=re.VERBOSE)
-    )
+    shown = str(markupsafe.escape(text))
+    for plain, of_pages in _SIGNS_OF_PAGES.items():
+        shown = re.sub(plain, of_pages, shown)
+    return markupsafe.Markup(shown)
 
 
 def render(package: str, template: str, **values: Any) -> str:
