@@ -12,6 +12,7 @@ from typing import ParamSpec, TypeVar
 import analytic
 from analytic.orbits.periodic import NoOrbitError
 from compare.claim import Claim, Criterion, Outcome, Verdict
+from compare.kit.plan import PLAN
 from compare.kit.quantities import quantity
 from compare.kit.record import Check, Measurement, Missing, Records
 from compare.kit.statistics import Estimate, coverage
@@ -72,14 +73,16 @@ def forget() -> None:
 def verdict(claim: Claim, records: Records) -> Verdict:
     """The verdict on a claim: each measurement beside its prediction, and the outcome.
 
-    Refuted if one check deviates beyond its tolerance; else inconclusive if of a criterion too few
-    checks are fine enough to tell, see `ENOUGH`; else not run if the claim predicts numbers and has
-    none, since counts confirm no number; else inconclusive if planned numbers are lost without a
-    reason that their protocol gave; else confirmed. A check that is too coarse confirms nothing,
+    Refuted if one check deviates beyond its tolerance; else not run if one of its protocols was not
+    carried out; else inconclusive if of a criterion too few checks are fine enough to tell, see
+    `ENOUGH`; else not run if the claim predicts numbers and has none, since counts confirm no
+    number; else inconclusive if planned numbers are lost without a reason that their protocol gave;
+    else confirmed. A check that is too coarse confirms nothing,
     and is counted apart. Whatever a prediction raises makes the verdict an error of this claim
     alone."""
-    lost = lost_to(claim, records)
-    missing = counted([*lost, *(m for m in records.missing if m.protocol in claim.protocols)])
+    absent, lost = not_carried_out(claim, records), lost_to(claim, records)
+    left_out = (each for each in records.missing if each.protocol in claim.protocols)
+    missing = (*absent, *counted([*lost, *left_out]))
     try:
         checks = tuple(checks_of(claim, records))
     except Exception as error:
@@ -91,6 +94,8 @@ def verdict(claim: Claim, records: Records) -> Verdict:
         why = "no number bears on the claim"
         missing = tuple(Missing(name, "all sets", why, 0) for name in known)
     said = outcome(claim, checks, per_criterion(checks), lost)
+    if absent and said is not Outcome.REFUTED:
+        said = Outcome.NOT_RUN
     return Verdict(claim=claim, outcome=said, checks=checks, missing=missing)
 
 
@@ -123,6 +128,17 @@ def lost_to(claim: Claim, records: Records) -> tuple[Missing, ...]:
         Missing(protocol, of, f"{name} was measured and is lost" if name else SILENT, rows)
         for (protocol, of, name), rows in sorted(records.lost.items())
         if (protocol, name) in asked
+    )
+
+
+def not_carried_out(claim: Claim, records: Records) -> tuple[Missing, ...]:
+    """The protocols of a claim of which there is nothing at all, though they are planned from its
+    level on."""
+    done = {row.protocol for row in (*records.rows, *records.planned)}
+    return tuple(
+        Missing(name, "all sets", f"protocol {name} was not carried out")
+        for name in sorted(claim.protocols - done)
+        if PLAN[name].level <= claim.level
     )
 
 

@@ -108,7 +108,7 @@ def line(verdict: Verdict) -> Text:
     shown = Text.assemble(
         (f"{mark} {verdict.outcome:<13}", _STYLES[kind]), f"{verdict.claim.id:<19}"
     )
-    if verdict.error or not verdict.checks:
+    if verdict.outcome is Outcome.NOT_RUN or verdict.error or not verdict.checks:
         return shown.append(_short(why_no_numbers(verdict), WIDTH - len(shown.plain)), "dim")
     said = _short(verdict.claim.statement, SAYS)
     shown.append(f"{said:<{SAYS}}{len(verdict.checks):>7} {_share(verdict):>5}  ")

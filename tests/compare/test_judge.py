@@ -130,6 +130,24 @@ def test_a_set_of_which_a_protocol_says_nothing_leaves_its_claims_undecided():
         assert outcome(about, replace(whole, planned=whole.planned + silent)) is expected
 
 
+def test_a_claim_is_not_run_before_all_of_its_protocols_are_carried_out():
+    """Whatever the others say, unless that refutes it; those of a later level need not be."""
+    criteria = [
+        Criterion(of, "omega_c", lambda m: m.parameters.omega_0)
+        for of in ("settled", "lift", "swing")
+    ]
+    about, one, both = made.claim("it", *criteria), rows(2), rows(2) + rows(2, "lift")
+    assert outcome(about, Records(both)) is Outcome.CONFIRMED
+    assert outcome(about, Records(rows(2), (Missing("lift", "mine", "why", 0),))) is not (
+        Outcome.NOT_RUN
+    )
+    verdict = judged(about, Records(one))
+    assert verdict.outcome is Outcome.NOT_RUN
+    assert str(verdict.missing[0]) == "all sets: protocol lift was not carried out"
+    off = made.claim("it", Criterion("settled", "omega_c", lambda m: 0.0), *criteria)
+    assert outcome(off, Records(one)) is Outcome.REFUTED
+
+
 def test_most_numbers_must_be_fine_enough_to_tell():
     sure, coarse = measured(P.omega_0, FINE), measured(P.omega_0, 0.01 * P.omega_0)
     for count, expected in (4, Outcome.CONFIRMED), (3, Outcome.INCONCLUSIVE):
