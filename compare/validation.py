@@ -31,6 +31,8 @@ from compare.report.results import Summary
 from model import Parameters
 from model.errors import check_type
 
+CLAIMS_SHARE = 2 / 3
+"""Share of judging again's time that the claims take, about; the report takes the rest."""
 Announce = Callable[[Verdict], None]
 """Called with every verdict as soon as it is there."""
 
@@ -209,12 +211,16 @@ def judge(
 
 
 def judge_stored(
-    directory: str | Path, claims: Sequence[str] | None = None, workers: int = 0
+    directory: str | Path,
+    claims: Sequence[str] | None = None,
+    workers: int = 0,
+    tell: Callable[[float], object] = lambda done: None,
 ) -> list[Verdict]:
     """Judge the measurements of a directory again, and write summary and report anew.
 
-    On so many processes; 0 is this one. Raises `StorageError` if a file is missing, damaged, or was
-    changed; `InputError` for an unknown claim."""
+    On so many processes; 0 is this one. `tell` is called with the fraction done. Raises
+    `StorageError` if a file is missing, damaged, or was changed; `InputError` for an unknown
+    claim."""
     directory = Path(directory)
     chosen = {claim.id for claim in select(CLAIMS, claims)}
     summary = results.load(directory)
@@ -224,7 +230,10 @@ def judge_stored(
     with processes(workers) as work:
         last_first = range(len(CLAIMS) - 1, -1, -1)  # they take longest
         found = zip(last_first, work.map(partial(_judged, directory), last_first), strict=True)
-        verdicts = {CLAIMS[n].id: Verdict(claim=CLAIMS[n], **each) for n, each in found}
+        verdicts = dict[str, Verdict]()
+        for n, each in found:
+            verdicts[CLAIMS[n].id] = Verdict(claim=CLAIMS[n], **each)
+            tell(CLAIMS_SHARE * len(verdicts) / len(CLAIMS))
         level, files = Level[summary.level], summary.measurements
         written = write(directory, level, files, records, verdicts, work.map)
     return [v for v in written if v.claim.id in chosen]

@@ -63,7 +63,7 @@ def judge(args: argparse.Namespace) -> int:
     from compare import validation  # here, because it loads everything there is
 
     console = options.terminal(quiet=args.json)
-    verdicts = validation.judge_stored(args.output, args.claim, args.workers)
+    verdicts = validation.judge_stored(args.output, args.claim, args.workers, args.tell)
     console.print(head())
     for verdict in verdicts:
         console.print(line(verdict), soft_wrap=True)

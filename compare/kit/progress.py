@@ -15,6 +15,8 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
+from compare.kit import compiling
+from compare.kit.compiling import OFTEN, SOON
 from compare.kit.workers import Spread
 from model.errors import few
 
@@ -55,12 +57,20 @@ class _Pace:
 
         What an earlier session did, getting ready, or another part, of which there are more or
         fewer, is no measure of how fast this is."""
+        self.look()
         first = self._before < 0 or not total or total != self._total
         if (done, total) != (self._done, self._total):
             self._said, self._done, self._total = time.monotonic(), done, total
         if first:
             self._began, self._before = time.monotonic(), done
         return first
+
+    def look(self) -> str:
+        """What is said of compiling, now and then: nothing that is done meanwhile is a measure."""
+        if said := compiling.now():
+            self._began = self._said = time.monotonic()
+            self._before = self._done
+        return said
 
     def left(self) -> float:
         """Seconds that are left; 0 where nobody knows.
@@ -74,13 +84,13 @@ class _Pace:
 
     def __str__(self) -> str:
         left = self.left()
-        return f"about {left:.0f} s to go" if left else ""
+        return self.look() or (f"about {left:.0f} s to go" if left else "")
 
 
 @contextmanager
 def reporter(quiet: bool = False, counted: bool = False) -> Iterator[Show]:
     """Yield a function that shows progress on standard error, which is never silent for longer than
-    `INTERVAL`.
+    `INTERVAL`, and at first than `SOON`; nor of compiling.
 
     `counted` if what is done are runs, whose number is to be shown, too. As long as the total is 0
     all is being made ready, and nothing is said of the time that is left.
@@ -112,16 +122,21 @@ def reporter(quiet: bool = False, counted: bool = False) -> Iterator[Show]:
         def remember(what: str, done: int, total: int, failed: int) -> None:
             nonlocal last
             if pace.note(done, total) and what != last[0]:
-                print(what, file=sys.stderr, flush=True)
+                print(", ".join(filter(None, [what, pace.look()])), file=sys.stderr, flush=True)
             last = what, done, total, failed
 
         def print_progress() -> None:
-            while not ended.wait(INTERVAL):
+            due = min(SOON, INTERVAL)
+            while not ended.wait(OFTEN):
+                pace.look()
+                if (passed := time.monotonic() - began) < due:
+                    continue
+                due = passed + INTERVAL
                 what, done, total, failed = last
-                said = f"{time.monotonic() - began:.0f} s: {what}"
+                said = f"{passed:.0f} s: {what}"
                 said += f", {done / total:.0%}" if total else ""
                 said += f", {failed} failed" if failed else ""
-                said += f", {pace}" if pace.left() else ""
+                said += f", {pace}" if str(pace) else ""
                 print(said, file=sys.stderr, flush=True)
 
         thread = threading.Thread(target=print_progress, daemon=True)

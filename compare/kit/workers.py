@@ -26,6 +26,7 @@ from multiprocessing import get_context, parent_process, resource_tracker
 from multiprocessing.connection import Connection
 from typing import Any, Self, TypeVar
 
+from compare.kit import compiling
 from model import InputError, StorageError
 from model.files import leave
 from model.parameters import Range, check_number
@@ -129,9 +130,10 @@ class _Pool(ProcessPoolExecutor):
         context = get_context("spawn")
         # ours must stay open until all workers have started
         self._end, self.leash = context.Pipe(duplex=False)
-        super().__init__(
-            count, mp_context=context, initializer=_follow_parent, initargs=(self._end,)
-        )
+        self._heard, told = context.Pipe(duplex=False)
+        compiling.workers.add(self._heard)
+        ends = self._end, told
+        super().__init__(count, mp_context=context, initializer=_follow_parent, initargs=ends)
 
     def submit(self, fn: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:
         # Workers that it may start inherit this: they have no handlers before they have imported
@@ -179,8 +181,9 @@ def _call_in_worker(fn: Callable[..., T], *args: Any, **kwargs: Any) -> T:
         _between.acquire()
 
 
-def _follow_parent(end: Connection) -> None:
-    """In a worker: leave Ctrl-C to the parent, and end with it, or when it says so."""
+def _follow_parent(end: Connection, told: Connection) -> None:
+    """In a worker: leave Ctrl-C to the parent, tell it of compiling, and end with it, or when it
+    says so."""
 
     def wait_for_parent() -> None:
         end.poll(None)
@@ -195,6 +198,7 @@ def _follow_parent(end: Connection) -> None:
     if sys.platform != "win32":
         signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
     threading.Thread(target=wait_for_parent, daemon=True).start()
+    compiling.tell(told)
 
 
 class _Here(Executor):
@@ -261,7 +265,8 @@ class LateError(BaseException):
 
 @contextmanager
 def at_most(limit: float) -> Iterator[None]:
-    """Raise `LateError` once more than `limit` s of processor time have passed.
+    """Raise `LateError` once more than `limit` s of processor time have passed in which nothing was
+    compiled.
 
     In the main thread of a process, where signals arrive; elsewhere, and on Windows, there is no
     limit."""
@@ -269,7 +274,14 @@ def at_most(limit: float) -> Iterator[None]:
         yield
         return
 
+    heard = compiling.listen()
+
     def raise_late(*_: object) -> None:
+        nonlocal heard
+        last, heard = heard, compiling.listen()
+        if heard > last or compiling.here():
+            signal.setitimer(signal.ITIMER_VIRTUAL, limit)
+            return
         raise LateError(f"it took longer than {limit:g} s")
 
     before = signal.signal(signal.SIGVTALRM, raise_late)

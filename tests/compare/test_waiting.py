@@ -8,7 +8,7 @@ import pytest
 
 import analytic
 from compare.commands import simulate, waiting
-from compare.kit import collection, progress
+from compare.kit import collection, compiling, progress, workers
 from model import Parameters, table
 from tests.commands import carried_out
 
@@ -32,13 +32,8 @@ def test_only_what_takes_long_says_so(soon, capsys):
     assert "s: slow, 25%" in said[1]
 
 
-@pytest.mark.parametrize(
-    ("kept", "often"), [(True, "once on this machine"), (False, "each time: no place to keep it")]
-)
-def test_compiling_says_so_and_is_no_measure_of_what_is_left(
-    kept, often, soon, capsys, tmp_path, monkeypatch
-):
-    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+def compiles(kept=False):
+    """Has numba compile something for two seconds of processor time."""
 
     @numba.njit(cache=kept)
     def slow(x):
@@ -51,22 +46,51 @@ def test_compiling_says_so_and_is_no_measure_of_what_is_left(
     compiled = slow._compiler.compile
 
     def compile_slowly(*given):
-        time.sleep(2.0)
+        works(2.0)
         return compiled(*given)
 
     slow._compiler.compile = compile_slowly
+    slow(1)
+
+
+def works(seconds):
+    """Takes so much processor time."""
+    ends = time.process_time() + seconds
+    while time.process_time() < ends:
+        pass
+
+
+@pytest.mark.parametrize(("kept", "often"), [(True, compiling.KEPT), (False, compiling.NOT_KEPT)])
+def test_compiling_says_so_and_is_no_measure_of_what_is_left(
+    kept, often, soon, capsys, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
     with waiting.told("it") as tell:
-        slow(1)
+        compiles(kept)
         began = time.monotonic()
         for k in range(1, 11):
             tell(k / 20)
             time.sleep(0.1)
         takes = 2 * (time.monotonic() - began)  # all of it, as half is done
     said = capsys.readouterr().err.splitlines()
-    assert any(f"it: compiling, {often}" in line for line in said), said
+    assert any(line.endswith(f"it, {often}") for line in said), said
     left = [float(line.split("about ")[1].split()[0]) for line in said if "to go" in line]
     assert left
     assert left[-1] < takes  # with compiling it would be half as much again
+
+
+def test_what_a_worker_compiles_is_told(soon, capsys):
+    with progress.reporter(), workers.processes(1) as fleet:
+        fleet.submit(compiles).result()
+    assert f"getting ready, {compiling.NOT_KEPT}" in capsys.readouterr().err
+
+
+def test_compiling_makes_nothing_late():
+    with workers.at_most(0.5):
+        compiles()
+        works(0.2)
+    with pytest.raises(workers.LateError), workers.at_most(0.5):
+        works(2.0)
 
 
 def test_a_table_is_told_as_it_is_written(tmp_path, capsys, monkeypatch):
