@@ -28,10 +28,10 @@ from model import InputError, Parameters
 from model.arrays import Array
 from model.parameters import POSITIVE, Range, check_choice, check_names, check_number
 
-FORESEEN, YIELDS = 2e-3, 1e-5
+PREDICTED, YIELDS = 2e-3, 1e-5
 """Slip of rigid contacts that roll, divided by what their friction force makes in a step: in motion
-at most twice, and once all is steady a hundredth of `Law.softness` of mjsim.coulomb. (Both were
-chosen after slips of a rolling ball had been seen.)"""
+at most twice, and once all is steady a hundredth of `Law.regularisation` of mjsim.coulomb. (Both
+were chosen after slips of a rolling ball had been seen.)"""
 LANDING_PARTS = 16
 """Into how many parts a step is divided in which a ball with rigid contacts lands: an impact falls
 into one of them."""
@@ -82,7 +82,7 @@ class RigidContacts:
 
     def dead_band(self, load: npt.ArrayLike) -> Array:
         """Slip speed (m s-1) below which a contact counts as rolling, under such a force."""
-        return FORESEEN / YIELDS * self.creep_speed(load)
+        return PREDICTED / YIELDS * self.creep_speed(load)
 
     def touching(self, g: float) -> float:
         """Gap (m) within which a ball at the start counts as touching."""
@@ -147,7 +147,7 @@ class ContactSettings:
         return 1 / (self.solimp * (self.solref[0] * self.solref[1]) ** 2)
 
     @property
-    def softness(self) -> float:
+    def regularisation(self) -> float:
         """Regularisation of the normal rows divided by the diagonal of A, R/A = (1 - d)/d, with d
         from `solimp`."""
         return (1 - self.solimp) / self.solimp
@@ -156,12 +156,13 @@ class ContactSettings:
         """The hover number mu |w| / (R f): a sliding contact stays closed below 1; of a `load` > 0.
 
         What R_t takes off |w| is left out, to be on the safe side."""
-        return friction * self.b_f * slip_speed / (self.softness * load)
+        return friction * self.b_f * slip_speed / (self.regularisation * load)
 
     def creep_speed(self, load: npt.ArrayLike) -> Array:
         """Slip speed (m s-1) of a contact that rolls steadily, R_t f_t / b_f, under a friction
         force of m times `load` (m s-2)."""
-        return np.asarray(self.softness / self.impratio / self.b_f * np.asarray(load, dtype=float))
+        own = self.regularisation / self.impratio / self.b_f
+        return np.asarray(own * np.asarray(load, dtype=float))
 
     def dead_band(self, load: npt.ArrayLike) -> Array:
         """Slip speed (m s-1) below which a contact counts as rolling, under such a force."""
@@ -183,7 +184,7 @@ class ContactSettings:
     def depth(self, load: float) -> float:
         """How deep the ball sinks under a steady load (force divided by mass, m s-2) while it
         rolls, m; slip lifts it."""
-        return self.softness * load / self.k
+        return self.regularisation * load / self.k
 
     def touching(self, g: float) -> float:
         """Gap (m) within which a ball at the start counts as touching: twice the depth to which
@@ -226,12 +227,12 @@ class ContactSettings:
 
         The impedance is lowered, where need be, until the hover number is 1/20, since a contact
         about to lift off carries little; the engine's least one, 1e-4, may stop that short. Damping
-        and softness of the friction rows stay what they are."""
+        and regularisation of the friction rows stay what they are."""
         settings = cls.at(timestep, **changes)
         hover = settings.hover_number(p.g, max(p.mu, p.eta), speed)
         if hover <= 0.05:
             return settings
-        solimp = max(1 / (1 + settings.softness * hover / 0.05), 1e-4)
+        solimp = max(1 / (1 + settings.regularisation * hover / 0.05), 1e-4)
         return dataclasses.replace(
             settings,
             solimp=solimp,

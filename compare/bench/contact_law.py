@@ -98,8 +98,8 @@ class SoftContacts:
         return bool((abs(self.rows[:, 0]) > 1e-9 * abs(self.rows).max(initial=1e-300)).any())
 
     @property
-    def softness(self) -> Array:
-        """R d/(1 - d): the inverse mass that scales the softness of rows or edges, 1/kg."""
+    def regularisation(self) -> Array:
+        """R d/(1 - d) of rows or edges, 1/kg, with their impedance d."""
         if not self.pyramidal:
             return self.inverse_mass
         mu2 = self.friction[:, 0] ** 2
@@ -134,7 +134,7 @@ class SoftContacts:
         return np.where(self._frictional, np.abs(self.force[:, 1:]) / self.friction, 0)
 
     def _rows(self, depth: Array) -> tuple[Array, Array, Array]:
-        """Softness of a row, its stiffness, and the damping of friction in steady motion."""
+        """R of a row, its stiffness, and the damping of friction in steady motion."""
         (spring, b, b_f), h = self._springs, self.timestep
         low, high, middle = np.clip(self.solimp[:, [0, 1, 3]], mujoco.mjMINIMP, mujoco.mjMAXIMP).T
         width, power = np.maximum(self.solimp[:, 2], 1e-15), np.maximum(self.solimp[:, 4], 1)
@@ -142,24 +142,24 @@ class SoftContacts:
         rising = x**power / middle ** (power - 1)
         falling = (1 - x) ** power / (1 - middle) ** (power - 1)
         d = low + (high - low) * np.where(x <= middle, rising, 1 - falling)  # the impedance
-        softness, k = (1 - d) / d * self.softness, spring * d
+        R, k = (1 - d) / d * self.regularisation, spring * d
         if not self.discrete:
-            return softness, k, b_f
+            return R, k, b_f
         if self.pyramidal:
-            return softness, k, b + k * h
-        return softness, k, b_f * (1 + b * h + k * h**2) / (1 + b_f * h)
+            return R, k, b + k * h
+        return R, k, b_f * (1 + b * h + k * h**2) / (1 + b_f * h)
 
     def _depth(self, slides: Array) -> Array:
         """Depth below the margin at which contacts bear their loads, by bisection, m."""
         load = self.force[:, 0]
         low, kept = np.zeros(len(load)), self.friction[:, 0] ** 2 / self.impratio * load
-        softness, k, _ = self._rows(low)
-        high = 1.01 * softness * load / k
+        R, k, _ = self._rows(low)
+        high = 1.01 * R * load / k
         for _ in range(100):
             middle = (low + high) / 2
-            softness, k, damping = self._rows(middle)
-            x, damped = k * middle / softness, damping[:, None] * self.friction * np.abs(self.slip)
-            sliding = damped / softness[:, None] * self._frictional
+            R, k, damping = self._rows(middle)
+            x, damped = k * middle / R, damping[:, None] * self.friction * np.abs(self.slip)
+            sliding = damped / R[:, None] * self._frictional
             if self.pyramidal:
                 edge = np.where(slides[:, None], x[:, None] + sliding, self._scaled_friction)
                 edges = (np.maximum(2 * x[:, None], edge) * self._frictional).sum(1)
@@ -176,16 +176,16 @@ class SoftContacts:
         mu, frictional, slides = self.friction, self._frictional, self.cone >= CONE
         _, b, b_f = self._springs
         depth = self._depth(slides)
-        softness, k, damping = self._rows(depth)
+        R, k, damping = self._rows(depth)
         first, _, first_damping = self._rows(np.zeros(len(load)))
         if self.pyramidal:
-            x, wanted = (k * depth / softness)[:, None], self._scaled_friction
+            x, wanted = (k * depth / R)[:, None], self._scaled_friction
             pushed = np.where(wanted <= 2 * x, wanted / 2, wanted - x)
-            creep = softness[:, None] * pushed / (mu * damping[:, None])
+            creep = R[:, None] * pushed / (mu * damping[:, None])
             hover = first * load / (first_damping * np.hypot(mu[:, 0], mu[:, 1]))
-            sideways = 2 * mu**2 / softness[:, None]
+            sideways = 2 * mu**2 / R[:, None]
         else:
-            soft = softness[:, None] / self.impratio * (mu[:, :1] / mu) ** 2
+            soft = R[:, None] / self.impratio * (mu[:, :1] / mu) ** 2
             creep = soft * np.abs(self.force[:, 1:]) / damping[:, None]
             apart = (1 + mu[:, 0] ** 2 / self.impratio) * first * load
             hover = apart / (mu[:, :2].max(1) * first_damping)
@@ -193,7 +193,7 @@ class SoftContacts:
         shift = 1e-6 * depth
         low, high = depth - shift, depth + shift
         (softer, k_less, _), (harder, k_more, _) = self._rows(low), self._rows(high)
-        slope = softness * (k_more * high / harder - k_less * low / softer) / (2 * shift)
+        slope = R * (k_more * high / harder - k_less * low / softer) / (2 * shift)
         # it corrects friction alone, after normal forces were found beside friction at no creep
         if self.noslip:
             creep, sticks = np.zeros_like(creep), frictional & ~slides[:, None]
@@ -211,7 +211,7 @@ class SoftContacts:
             turning=np.where(slides | (self.dim <= 3), np.nan, np.hypot.reduce(creep[:, 2:], 1)),
             hover=np.where(self.dim > 1, hover, np.inf),
             slides=slides,
-            weight=np.column_stack([criterion / softness, sideways]),
+            weight=np.column_stack([criterion / R, sideways]),
             stiffness=slope,
             damping=np.column_stack([b, *[b_f] * 5]),
         )

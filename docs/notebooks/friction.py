@@ -63,7 +63,7 @@ GRIPPER = """
 # ## The forecast
 #
 # `dualball forecast scene.xml` does this on the command line. The engine settles the
-# model and says what each contact carries. The creep follows from the softness $R_t$ of
+# model and says what each contact carries. The creep follows from the regularisation $R_t$ of
 # the friction rows and their damping $b_f$: a contact that bears the friction $f_t$
 # slips at $R_t f_t / b_f$.
 

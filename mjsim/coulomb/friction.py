@@ -129,8 +129,8 @@ def learn(memory: Any, contact: Any) -> None:
     if not memory.law.rigid or contact.state != SLIDES or contact.extrapolated < 0:
         contact.bias, contact.missed = 0.0, 0.0
         return
-    foreseen = max(contact.extrapolated + contact.bias, 0.0)
-    contact.error = max(contact.error, abs(contact.found - foreseen))
+    predicted = max(contact.extrapolated + contact.bias, 0.0)
+    contact.error = max(contact.error, abs(contact.found - predicted))
     before, contact.missed = contact.missed, contact.found - contact.extrapolated
     most = min(abs(before), abs(contact.missed)) if before * contact.missed > 0 else 0.0
     contact.bias = min(max((contact.bias + contact.missed) / 2, -most), most)
@@ -221,7 +221,7 @@ def predict_slip(model: Any, data: Any, memory: Any) -> bool:
 
 
 @kernel
-def foresee(model: Any, data: Any, memory: Any) -> None:
+def extrapolate_slip(model: Any, data: Any, memory: Any) -> None:
     """Find what would have been predicted of a step that was solved: the next one need not be, if
     that was right."""
     contacts, rows = contacts_of(memory), rows_of(memory)

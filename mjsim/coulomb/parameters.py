@@ -27,7 +27,7 @@ class Law:
     predicted."""
     most: int = 20
     """Solutions that a step may take for that."""
-    softness: float = 1e-3
+    regularisation: float = 1e-3
     """R of a rigid contact, in units of the inverse mass that the engine estimates."""
     push: float = 0.1
     """Share of its depth that a rigid contact loses in a step."""

@@ -47,7 +47,7 @@ def stiffen(model: Any, data: Any, memory: Any) -> None:
             # what an impact makes touch, or touch again, bounces in the next step
             bounce = rebound(share, contact.gap, speed, fall, h)
             goal = -APART * h if parts or comes else max(goal, bounce)
-        factor = law.softness * estimate[first] / R[first]
+        factor = law.regularisation * estimate[first] / R[first]
         for r in range(first, first + contact.dim):
             R[r] *= factor
             reference[r] = ((goal if r == first else 0.0) - velocity[r]) / h
@@ -166,7 +166,7 @@ def in_plane(one: Any, other: Any) -> Any:
 
 
 @kernel
-def share_softness(data: Any, memory: Any) -> None:
+def share_regularisation(data: Any, memory: Any) -> None:
     """Tell the R of contacts to all places where MuJoCo keeps it: D, islands."""
     R, D = reals(data.efc_R, data.nefc), reals(data.efc_D, data.nefc)
     island_R, island_D = reals(data.iefc_R, data.nefc), reals(data.iefc_D, data.nefc)

@@ -31,8 +31,8 @@ from .engine import (
     words,
 )
 from .friction import (
+    extrapolate_slip,
     find_forces,
-    foresee,
     predict_slip,
     store_forces,
     strengthen,
@@ -47,7 +47,7 @@ from .rigid import (
     add_gyroscopic_moments,
     oppose_slip_at_mid_step,
     share_loads,
-    share_softness,
+    share_regularisation,
     stiffen,
     take_dampers_away,
     take_depth_away,
@@ -100,7 +100,7 @@ def law_of_a_step(m: int, d: int, at: int) -> None:
     elif rigid:
         oppose_slip_at_mid_step(model, data, memory)
     if rigid:
-        share_softness(data, memory)
+        share_regularisation(data, memory)
     write_references(data, memory)
 
 
@@ -261,7 +261,7 @@ def solve_rigid(model: Any, data: Any, memory: Any, start: Any) -> bool:
     subtract_references(memory)
     if oppose_slip_at_mid_step(model, data, memory):
         solved &= solve_contacts(model, data, memory, start)
-    foresee(model, data, memory)
+    extrapolate_slip(model, data, memory)
     return bool(solved)
 
 
@@ -272,7 +272,7 @@ def iterate(model: Any, data: Any, memory: Any, start: Any) -> bool:
     contacts, rows = contacts_of(memory), rows_of(memory)
     acceleration = reals(data.qacc, model.nv)
     if memory.law.rigid:
-        share_softness(data, memory)
+        share_regularisation(data, memory)
     for _ in range(memory.law.most):
         write_references(data, memory)
         mj_fwdConstraint(memory.model, memory.data)

@@ -111,7 +111,7 @@ def test_slipping_begins_to_hover_at_the_damping_that_takes_all_its_depth():
     settings = [damped(0.3, damping) for damping in (0.1, 0.2)]
     (first, _), (last, turning) = map(slipping, settings)
     load, slip = last["force_A"][1] / SLIPPING.m, last["slip_speed_A"]
-    softer = settings[1].softness * load * (1 + SLIPPING.mu**2 / settings[1].impratio)
+    softer = settings[1].regularisation * load * (1 + SLIPPING.mu**2 / settings[1].impratio)
     limit = 0.2 * softer / (SLIPPING.mu * settings[1].b_f * slip)
     crossing = 0.1 + 0.1 * first["gap_A"] / (first["gap_A"] - last["gap_A"])
     assert crossing == pytest.approx(limit, rel=turning)
@@ -125,6 +125,6 @@ def test_slip_dies_out_in_rolling_by_a_share_a_step(impratio):
     spin = 0.5 * float(settings.creep_speed(p.mu * p.g)) / p.r
     x0 = -settings.depth(p.g), 0, 0, 0, 0, spin, 0.01, 0  # as deep as the floor bears it
     run = mjsim.simulate(p, x0, 0.02, settings=settings, sample_interval=STEP)
-    share = 1 / (1 + settings.softness / impratio / (1 + 1 / p.j))
+    share = 1 / (1 + settings.regularisation / impratio / (1 + 1 / p.j))
     left = run.slip_speed_A[3] / run.slip_speed_A[2]
     assert left == pytest.approx(1 - 0.5 * share, rel=p.c * STEP)

@@ -8,7 +8,7 @@ import pytest
 import analytic
 import mjsim
 from analytic.slipping.slip_stability import lift_onset
-from mjsim.contact_settings import FORESEEN, YIELDS
+from mjsim.contact_settings import PREDICTED, YIELDS
 from mjsim.coulomb.parameters import Law
 from mjsim.stepping import SHARE
 from model import Case, Parameters, State
@@ -75,8 +75,8 @@ def test_what_rolls_on_the_wall_and_slides_on_the_floor_goes_on_in_short_steps(s
 
 
 def test_what_counts_as_slip_follows_from_numbers_of_the_law() -> None:
-    assert pytest.approx(FORESEEN) == 2 * Law.softness
-    assert pytest.approx(YIELDS) == Law.softness / 100
+    assert pytest.approx(PREDICTED) == 2 * Law.regularisation
+    assert pytest.approx(YIELDS) == Law.regularisation / 100
 
 
 def test_a_ball_of_a_moment_of_inertia_just_beyond_the_least() -> None:
