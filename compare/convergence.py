@@ -1,4 +1,4 @@
-"""A convergence study in the time step, with Richardson extrapolation to no step.
+"""A convergence study in the time step, with Richardson extrapolation to a zero step.
 
 An engine measures the same with several time steps. Of every check the deviation from theory,
 divided by its scale, is extrapolated by polynomials in the step h: with all powers from the first,
@@ -111,7 +111,7 @@ def zero_step_limits(
 
 
 def zero_step_limit(series: StepSeries, ends: Ends = frozenset()) -> Limit | None:
-    """A check extrapolated to no time step; None where it has no limit.
+    """A check extrapolated to a zero time step; None where it has no limit.
 
     What is counted, or unknown to theory, has none but what the finest step says."""
     m, scale, n = series.last.measurement, series.last.scale or 1.0, len(series.checks)
@@ -155,9 +155,9 @@ def extrapolated(steps: Array, errors: Array, own: Array) -> tuple[Estimate, flo
 
     `own` (n,) are standard uncertainties of the errors that have nothing to do with the step. Where
     the last three errors differ by no more than these, the last is the limit, and the order nan; at
-    worst they go on so to no step. Where four or more fall faster than by any order that is looked
-    for, the last is, too, to within its last change. (Chosen after errors of fourth order had been
-    seen.)
+    worst they go on so to a zero step. Where four or more fall faster than by any order that is
+    looked for, the last is, too, to within its last change. (Chosen after errors of fourth order
+    had been seen.)
 
     The uncertainty covers the truth where the leading term is at least a third of what the next one
     would be with a step of a natural time unit. Of random series whose leading term may vanish by

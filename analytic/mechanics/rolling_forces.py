@@ -40,7 +40,8 @@ def admissible_interval(
     (mu, eta > 1)."""
     least, greatest = _interval(*_loads(omega_c, p, omega_0), p)
     exists = (least <= greatest) & (greatest > -np.inf) & (margin(omega_c, p, omega_0) >= 0)
-    return tuple(np.where(exists, p.m * p.g * end, np.nan) for end in (least, greatest))  # type: ignore[return-value]
+    low, high = (np.where(exists, p.m * p.g * end, np.nan) for end in (least, greatest))
+    return low, high
 
 
 def margin(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None) -> Array:

@@ -71,7 +71,7 @@ def write(directory: Path) -> None:
     write_text(directory / "README.md", README.read_text("utf-8").format(**said))
 
 
-_BLOW = {
+_IMPACT = {
     "a hollow sphere": {"j": 1.5},
     "friction 20 % too weak": {"mu": 0.8, "eta": 0.8},
     "it bounces at 0.3 of its speed": {"restitution": 0.3},
@@ -95,14 +95,14 @@ VESSEL: tuple[tuple[str, str, Parameters, State, float, Mapping[str, Mapping[str
      SLOW.replace(omega_0=20.0), State(omega_c=8.0), 3.0, _SLIP),
     ("lands", "it slides down the wall, lands on the floor, slips on both, then rolls (NS, SS, RR)",
      SLOW, State(y=0.02, v_y=-0.2, omega_c=12.0, slip_x=30.0, slip_y=-10.0, slip_z=20.0),
-     0.5, _BLOW),
+     0.5, _IMPACT),
     ("hits-the-wall",
      "it slides on the floor, hits the wall, slips on both, then rolls (SN, SS, RR)",
      SLOW, State(omega_c=10.0, slip_x=20.0, slip_y=10.0, slip_z=30.0, h=0.01, v_h=-0.3),
-     0.5, _BLOW),
+     0.5, _IMPACT),
     ("falls-in",
      "it flies, meets the wall, then the floor, comes back to the wall (NN, NS, RN, RS, RR)",
-     SLOW, State(y=0.05, h=0.03, omega_c=8.0, v_h=-0.3), 0.7, _BLOW),
+     SLOW, State(y=0.05, h=0.03, omega_c=8.0, v_h=-0.3), 0.7, _IMPACT),
 )
 # fmt: on
 """The paper's ball: name, what happens, parameters, start, duration in s, and wrong answers."""

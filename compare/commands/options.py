@@ -53,7 +53,9 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         raise InputError(f"{message}; see '{self.prog} --help'")
 
-    def parse_known_args(self, *given: Any) -> tuple[argparse.Namespace, list[str]]:  # type: ignore[override]
+    def parse_known_args(  # type: ignore[override]
+        self, *given: Any
+    ) -> tuple[argparse.Namespace, list[str]]:
         """As argparse does, but for what that takes in silence, or tells of in other words."""
         self._refuse_one_dash(given[0])
         found, rest = super().parse_known_args(*given)

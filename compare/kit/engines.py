@@ -31,7 +31,7 @@ class Role(Enum):
 
     ON_TRIAL = auto()
     IN_THE_LIMIT = auto()
-    """Of no time step, beside the one on trial."""
+    """In the zero-step limit, beside the one on trial."""
     AS_IT_COMES = auto()
     """With its own settings and step, beside the one on trial."""
     FREE_BODY = auto()
@@ -227,7 +227,10 @@ MOREAU = replace(
     name="time-stepping",
     options=("timestep", "rtol", "restitution"),
     torque=True,
-    configure=lambda given, p: analytic.Settings(method="time-stepping", **given),  # type: ignore[arg-type]
+    configure=lambda given, p: analytic.Settings(
+        method="time-stepping",
+        **given,  # type: ignore[arg-type]
+    ),
     simulate=partial(_theory, "time-stepping"),
     mark="^",
 )

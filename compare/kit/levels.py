@@ -108,7 +108,7 @@ class Sampling:
     field_kept: int = 4  # most states measured for every case and set
     rates_divisors: tuple[int, int] = (8, 16)  # the two time steps, in parts of the coarse step
     # in SR: with shorter ones an almost unloaded floor carries more or none
-    rates_leaning: tuple[int, int] = (8, 16)
+    rates_SR: tuple[int, int] = (8, 16)
     rates_more: float = 1  # multiples of the numbers of states in rates.STATES
     laws_divisors: tuple[int, int] = (4, 8)  # the two time steps, in parts of the coarse step
     motions_pieces: int = 6  # of a motion
@@ -155,7 +155,7 @@ AT_FULL = replace(
     motions_pieces=32,
 )
 OWN_STEPS = replace(
-    # the same run twice: all numbers are extrapolated to no step from several steps
+    # the same run twice: all numbers are extrapolated to a zero step from several
     AT_QUICK, halves=(2, 2), field_steps=(2, 2, 2), granted=True, slow=False,
     settling_rounds=(0.45, 1.0, 1.0),
     settled_starts=(("with the fluid", (0.62, 1.7, 4.2)), ("on the wall", (1.7, 4.2))),
@@ -169,7 +169,7 @@ OWN_STEPS = replace(
     pulsation_octaves=(3,), pulsation_steps=256, pulsation_samples=512, pulsation_divisor=1,
     pulsation_reach=1.5,
     pulsation_width=2e-3,
-    rates_divisors=(16, 16), rates_leaning=(16, 16), rates_more=0.5,
+    rates_divisors=(16, 16), rates_SR=(16, 16), rates_more=0.5,
     bounds_divisor=1,
     laws_divisors=(4, 4),
     field_starts=2, field_kept=2,

@@ -118,7 +118,7 @@ forget much more. So it is anything between none and all of the difference: a un
 distribution."""
 
 
-def of_no_step(coarse: float, fine: Estimate) -> Estimate:
+def at_zero_step(coarse: float, fine: Estimate) -> Estimate:
     """The limit of a vanishing step of a number that is a smooth function of it, from the values
     with a step and with half of it."""
     change = fine.value - coarse

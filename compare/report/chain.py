@@ -93,8 +93,11 @@ def _judged(criterion: Criterion, checks: list[Check]) -> list[Link]:
     for name, at in asked_of_theory(criterion, checks[0].measurement) if checks else ():
         chain.append(Link("predicted by", name, at))
     if checks:
-        text = f"{len(checks)} numbers, {sum(each.conclusive for each in checks)} can tell"
+        count, told = len(checks), sum(each.conclusive for each in checks)
+        text = f"{count} number{'s' if count > 1 else ''}, {told} can tell"
         chain.append(Link("numbers", text, place(judge.check), numbers(checks)))
+    else:
+        chain.append(Link("numbers", "none"))
     return chain
 
 

@@ -44,8 +44,8 @@ def assert_same(run, other, tolerance):
 def landings(run):
     """How many of its landings count."""
     p, e = run.header.parameters, run.header.settings["restitution"]
-    blows = np.maximum(run.events.impulse_A[:, 1], run.events.impulse_B[:, 0]) / p.m / (1 + e)
-    return np.sum(blows > 1e-3 * np.sqrt(p.g * p.R))
+    impacts = np.maximum(run.events.impulse_A[:, 1], run.events.impulse_B[:, 0]) / p.m / (1 + e)
+    return np.sum(impacts > 1e-3 * np.sqrt(p.g * p.R))
 
 
 @pytest.mark.parametrize(

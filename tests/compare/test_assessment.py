@@ -1,4 +1,4 @@
-"""What other engines say is judged in limits of no step that contain the truth, of all that they
+"""What other engines say is judged in zero-step limits that contain the truth, of all that they
 were asked."""
 
 import math
@@ -101,7 +101,7 @@ def test_the_uncertainty_of_a_limit_covers_the_truth():
         (5e-6, 1e-5, 3, 0.9, Outcome.REFUTED),
     ],
 )
-def test_a_claim_is_judged_in_the_limit_of_no_step(left, least, steps, near, outcome):
+def test_a_claim_is_judged_in_the_zero_step_limit(left, least, steps, near, outcome):
     """States that differ a little with the step are the same state; at 2 ms it is off by what users
     see."""
     end = Records((measured("thresholds", "omega_01", near * P.omega_0, 1e-6, P, "mine"),))

@@ -42,13 +42,13 @@ def test_a_case_is_whole_and_no_sample_near_an_impact(name):
         assert case.error(states) > 2.5 * TOLERANCE, text
     # No sample is near an impact: where an engine is late by a step, it is not to be wrong by the
     # whole jump.
-    blows = [time for time, jumps in zip(*changes(case), strict=True) if jumps]
+    impacts = [time for time, jumps in zip(*changes(case), strict=True) if jumps]
     if what := {"rocking-block": 7, "bounce": 5}.get(name):  # what jumps there of a state
         fine = np.arange(1, 20000) * (case.times[-1] / 20000)
         found = WAYS[name][0](dataclasses.replace(case, times=fine))[:, what]
-        blows = fine[1:][np.abs(np.diff(found)) > 0.02]
-        assert len(blows)
-    assert all(np.abs(case.times - time).min() > 5e-3 for time in blows)
+        impacts = fine[1:][np.abs(np.diff(found)) > 0.02]
+        assert len(impacts)
+    assert all(np.abs(case.times - time).min() > 5e-3 for time in impacts)
 
 
 def test_the_list_that_is_shown_is_that_of_the_cases():

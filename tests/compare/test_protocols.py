@@ -37,9 +37,9 @@ from compare.kit.statistics import (
 )
 from compare.kit.step_pairs import (
     Start,
+    at_zero_step,
     lag_error,
     of_no_order,
-    of_no_step,
     of_three_steps,
     unlike,
 )
@@ -210,10 +210,10 @@ def test_an_uncertainty_is_made_up_of_its_causes():
 
 
 @pytest.mark.parametrize(("order", "off"), [(1.0, 3.0), (1.585, 0.0), (2.0, 1 / 3), (20.0, 3.0)])
-def test_a_limit_of_no_step_is_sure_whatever_the_order(order, off):
+def test_a_zero_step_limit_is_sure_whatever_the_order(order, off):
     """The bounds of a uniform distribution are three variances off."""
     coarse, fine = (7.0 + 0.1 * h**order for h in (1.0, 0.5))
-    limit = of_no_step(coarse, estimate(fine))
+    limit = at_zero_step(coarse, estimate(fine))
     deviation = (limit.value - 7.0) / limit.uncertainty
     assert abs(deviation) <= math.sqrt(3) * (1 + 1e-5)
     assert deviation**2 == pytest.approx(off, abs=1e-3)
@@ -291,7 +291,7 @@ def test_a_pair_of_steps_shows_the_error_of_an_engine_that_has_none(runner):
         float(run.omega_c[-1])
         for run in runner.each([runner.task(P, x, lasts, coarse_step(P) / n) for n in (1, 2)])
     )
-    error = of_no_step(coarse, estimate(fine))
+    error = at_zero_step(coarse, estimate(fine))
     assert 0 < abs(error.value - truth.omega_c[-1]) <= COVERAGE * error.uncertainty < 1e-6
 
 

@@ -76,7 +76,7 @@ def test_between_the_bands_a_contact_is_what_it_was() -> None:
 @pytest.mark.parametrize("motion", [LANDING, HITTING])
 def test_cases_and_events_come_from_steps_whatever_the_sampling(motion) -> None:
     """The first contact closes when it should, to a step; then come all cases of theory, in order,
-    with some in between that last while a contact settles after a blow."""
+    with some in between that last while a contact settles after an impact."""
     exact = motion.exact.events
     runs = [
         mjsim.simulate(

@@ -36,10 +36,10 @@ from compare.kit.statistics import Estimate, estimate, hops, peaks, settled_case
 from compare.kit.step_pairs import (
     Start,
     StepPair,
+    at_zero_step,
     carry_out,
     constrained,
     of_no_order,
-    of_no_step,
 )
 from compare.kit.sweep import sobol
 from compare.kit.tasks import Task
@@ -124,7 +124,7 @@ def _hopping(runner: Runner, shares: Sequence[float], divisors: tuple[int, int])
         coarse_birth, fine_birth = (
             birth(flows[: len(heights)], each) for each in zip(*heights, strict=True)
         )
-        yield result.row("orbit_birth", of_no_step(coarse_birth.value, fine_birth))
+        yield result.row("orbit_birth", at_zero_step(coarse_birth.value, fine_birth))
 
 
 def with_groups(p: Parameters, kappa: float, Omega_0: float, **others: float) -> Parameters:
@@ -278,7 +278,7 @@ def rebounding(runner: Runner, sets: Sets, records: Records) -> Measured:
                 return
             coarse, fine = (tops(run, REBOUNDS_ALONE / 2, REBOUNDS_ALONE).values for run in runs)
             for name in ("orbit_period", "orbit_omega_c"):
-                value = of_no_step(coarse[name].value, fine[name])
+                value = at_zero_step(coarse[name].value, fine[name])
                 yield runner.measurement(SET, p, name, value, alone, **at)
 
 
@@ -290,7 +290,7 @@ def death(etas: Sequence[float], factors: Sequence[Sequence[float]]) -> Estimate
     slow, fast, later = (
         float(np.polyfit(np.array(each) - 1, etas, 1)[-1]) for each in zip(*factors, strict=True)
     )
-    return of_no_step(slow, estimate(fast, part=abs(fast - later)))
+    return at_zero_step(slow, estimate(fast, part=abs(fast - later)))
 
 
 def swing(runner: Runner, sets: Sets, records: Records) -> Measured:
@@ -312,7 +312,7 @@ def swing(runner: Runner, sets: Sets, records: Records) -> Measured:
     at = state_of(constrained(Case.SS, result.fine.x[-1], p)) | Conditions(period=parts[1][0])
     names = "swing_period", "swing_omega_c", "swing_size"
     for name, coarse, fine, before in zip(names, *parts, strict=True):
-        value = of_no_step(coarse, estimate(fine, part=abs(fine - before)))
+        value = at_zero_step(coarse, estimate(fine, part=abs(fine - before)))
         yield result.row(name, value, **at)
 
 

@@ -51,8 +51,8 @@ from compare.kit.step_pairs import (
     STEP_RATIO,
     WINDOW_DEGREES,
     Start,
+    at_zero_step,
     lag_error,
-    of_no_step,
     polynomials,
     random_state,
 )
@@ -696,7 +696,7 @@ def _onset(runs: Sequence[Trajectory]) -> Estimate | None:
     for coarse, fine in zip(map(_force, runs[::2]), map(_force, runs[1::2]), strict=True):
         if coarse is None or fine is None:
             return None
-        forces.append(of_no_step(coarse.value, fine))
+        forces.append(at_zero_step(coarse.value, fine))
     square = extrapolated_zero(squares, forces) if forces else Estimate(0.0, math.inf)
     if not square.value > 0 or math.isinf(square.uncertainty):
         return None

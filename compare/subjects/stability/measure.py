@@ -163,7 +163,7 @@ class Pushed:
         """The longer and the shorter time step, s."""
         sampling, step = self.runner.sampling, coarse_step(self.start.p)
         leans = self.case is Case.SR
-        coarse, fine = sampling.rates_leaning if leans else sampling.rates_divisors
+        coarse, fine = sampling.rates_SR if leans else sampling.rates_divisors
         return step / coarse, step / fine
 
     @property

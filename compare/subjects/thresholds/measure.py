@@ -60,11 +60,11 @@ CREEPS = 100.0
 class Passage(StrEnum):
     """A flow up to which, or from which on, a ball moves in some case."""
 
-    RR_ENDS = "rolling"
-    NS_ENDS = "sinking"
-    SS_ENDS = "slipping"
-    NR_BEGINS = "riding"
-    RR_RETURNS = "leaning"
+    RR_ENDS = "RR ends"
+    NS_ENDS = "NS ends"
+    SS_ENDS = "SS ends"
+    NR_BEGINS = "NR begins"
+    RR_RETURNS = "RR returns"
     FOLD = "fold"
 
 
@@ -216,7 +216,7 @@ def measure(runner: Runner, sets: Sets, records: Records) -> Measured:
         for kind, bracket in each.brackets.items():
             if bracket.failure and kind is not Passage.NS_ENDS:  # which is looked for roughly
                 yield each.missing(
-                    f"{kind}: its limit is known less well, as a run {bracket.failure}", 0
+                    f"{kind}: its flow is known less well, as a run {bracket.failure}", 0
                 )
         yield from _rows(each)
         yield from _rows_of_slipping(each)

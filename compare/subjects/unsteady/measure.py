@@ -36,10 +36,10 @@ from compare.kit.step_pairs import (
     Start,
     StepPair,
     StepPairResult,
+    at_zero_step,
     carry_out,
     constrained,
     of_no_order,
-    of_no_step,
 )
 from compare.kit.tasks import Task
 from model import Case, Contact, Flow, Parameters, State, Trajectory
@@ -410,12 +410,12 @@ def _rows(result: StepPairResult) -> Measured:
     pair, coarse, fine = result.pair, result.coarse, result.fine
     if pair.flow is None:
         rolls = pair.name == "RR"
-        limit = of_no_step if rolls else of_no_order
+        limit = at_zero_step if rolls else of_no_order
         for quantity in ("jump_delay",) if rolls else ("jump_peak", "jump_height"):
             row = result.row(quantity, limit(coarse[quantity].value, fine[quantity]))
             yield if_found(row, f"{quantity} in {pair.name}: no peak")
     elif math.isfinite(coarse) and math.isfinite(fine):
-        yield result.row("ramp_end", of_no_step(coarse, estimate(fine)))
+        yield result.row("ramp_end", at_zero_step(coarse, estimate(fine)))
     else:
         ramp = f"a ramp of {pair.at['rate']:.3g} rad/s^2"
         yield result.missing(f"{ramp} doesn't end slipping at both points")
