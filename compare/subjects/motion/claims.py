@@ -62,10 +62,10 @@ def _end_of_motion(m: Measurement) -> Estimate:
 
 
 def _end_states(*starts: str) -> tuple[Criterion, ...]:
-    """Criteria on the state at the end of motions from starts whose names begin so."""
+    """Criteria on the state at the end of motions from these starts."""
 
     def starts_so(m: Measurement) -> bool:
-        return m.at["start"].startswith(starts)
+        return m.at["start"] in starts
 
     return criteria(
         "runs", [f"end_{name}" for name in VARIABLES], _end_of_motion, when=starts_so, by=_RUN
@@ -161,7 +161,7 @@ LAW_CLAIMS = (
         "extension, (9), (20)",
         "A ball that is thrown flies on under gravity and drag, past the axis of the vessel, and "
         "keeps its spin.",
-        *_end_states("thrown"),
+        *_end_states("thrown", "thrown up", "thrown, blunter"),
         Criterion(
             "runs",
             "end_y",
@@ -177,14 +177,23 @@ LAW_CLAIMS = (
         "The wall contact opens where it carries no load, or where friction at the floor pulls the "
         "ball inwards more than its orbit needs. The ball then leaves the wall as the equations "
         "say.",
-        *_end_states("pulled off"),
+        *_end_states("pulled off, at rest", "pulled off, going round"),
     ),
     claim(
         "sliding",
         "(20), (23)-(29)",
         "A ball that slips or rolls at one contact or both moves on from case to case as the "
         "equations say, also while the flow rises or falls.",
-        *_end_states("slips", "rolls", "sinks"),
+        *_end_states(
+            "slips at the floor",
+            "slips at the wall",
+            "slips at both",
+            "slips off the wall",
+            "rolls off the wall",
+            "rolls while the flow rises",
+            "rolls while the flow falls",
+            "sinks along the wall",
+        ),
     ),
     claim(
         "smooth-wall",

@@ -276,42 +276,35 @@ def _values(
 
     They are extrapolated to a vanishing step, see `of_three_steps`, and uncertain by what that may
     leave, and by what the degree of the polynomials changes of the limit, see `unlike`."""
-    p, runner, read = result.pair.p, result.runner, []
-    for run, times in zip(result.reads, runner.sampling.field_steps, strict=True):
-        middle, half, around = (
-            steps * times for steps in (centre, HALF_WINDOW, HALF_WINDOW + AROUND_WINDOW)
-        )
-        window = slice(middle - half, middle + half + 1)
-        changes = np.any(run.case[middle - around : middle + around + 1] != case)
-        if changes or turns_or_hovers(case, run, window):
-            return None
-        time, at = run.time[window], float(run.time[middle])
-        # The forces of a sample act from then on for a step: they belong to the middle of it.
-        acting = time + (time[1] - time[0]) / runner.divisor / 2
-        both = np.concatenate([run.force_A, run.force_B], axis=1)[window]
-        loads, _ = polynomials(acting, both, FIELD_DEGREES, at)
-        motion = polynomials(time, run.x[window], FIELD_DEGREES, at)
-        read.append(np.concatenate([*motion, loads], axis=1))
-    # (3, 22) of each degree: state, rates, forces at A and B
-    (limit, other), (lower, _) = (of_three_steps(of) for of in np.stack(read, axis=1))
+    p, runner = result.pair.p, result.runner
+    reads = [
+        _amid(case, runner, run, centre * times, times)
+        for run, times in zip(result.reads, runner.sampling.field_steps, strict=True)
+    ]
+    found = [read for read in reads if read is not None]
+    if len(found) < len(reads):
+        return None
+    (limit, other), (lower, _) = (of_three_steps(of) for of in np.stack(found, axis=1))
     rows = np.stack([limit, other, lower])
     speed, spin, weight = math.sqrt(p.g * p.R), p.g / p.r, p.m * p.g
     scales = np.array([speed, p.g, p.g / p.R, spin, spin, spin, speed, p.g])
     held = forces(rows[:, 16:19].T, rows[:, 19:].T)
-    read_off = {f"rate_{VARIABLES[k]}": (rows[:, 8 + k], float(scales[k])) for k in MOVING[case]}
+    rates = {f"rate_{VARIABLES[k]}": k for k in MOVING[case]}
+    read_off = {name: (rows[:, 8 + k], float(scales[k])) for name, k in rates.items()}
     read_off |= {f"moving_force_{name}": (held[name], weight) for name in _determined(case)}
     best, other, lower = np.transpose([of / size for of, size in read_off.values()])
     steps, degrees = unlike(best - other, SURER), unlike(best - lower, SURER)
     # A contact that rolls is held by friction of a moment ago: its slip should not change at all,
     # and what it changes comes from the rates of other variables.
-    slips = [k for k in range(8)[SLIP_XYZ] if VARIABLES[k] in TRAITS[case].constraints]
-    rolling = float(np.abs(rows[0, 8:16] / scales)[slips].max(initial=0.0))
+    slips = range(8)[SLIP_XYZ]
+    held_slips = [k for k in slips if VARIABLES[k] in TRAITS[case].constraints]
+    rolling = float(np.abs(rows[0, 8:16] / scales)[held_slips].max(initial=0.0))
     # friction of a load that is wrong changes slip so much more than speed
     by_friction = max(1.0, max(p.mu, p.eta) * (1 + 1 / p.j))
     values = {}
     for k, (name, (of, size)) in enumerate(read_off.items()):
-        causes = {"rolling": uniform(rolling)} if name.startswith("rate") else {}
-        more = by_friction if name.startswith("rate_slip") else 1.0
+        causes = {"rolling": uniform(rolling)} if name in rates else {}
+        more = by_friction if rates.get(name) in slips else 1.0
         causes |= {
             "time_step": uniform(float(steps[k])),
             "degree": uniform(float(degrees[k])),
@@ -319,6 +312,23 @@ def _values(
         }
         values[name] = estimate(of[0], size, **causes)
     return constrained(case, rows[0, :8], p), values
+
+
+def _amid(case: Case, runner: Runner, run: Trajectory, middle: int, times: int) -> Array | None:
+    """State, rates, and forces at A and B amid a window, (2, 22), by polynomials of both degrees;
+    None if the case changes, or `turns_or_hovers`. A window has `times` as many steps as usual."""
+    half, around = times * HALF_WINDOW, times * (HALF_WINDOW + AROUND_WINDOW)
+    window = slice(middle - half, middle + half + 1)
+    changes = np.any(run.case[middle - around : middle + around + 1] != case)
+    if changes or turns_or_hovers(case, run, window):
+        return None
+    time, at = run.time[window], float(run.time[middle])
+    # The forces of a sample act from then on for a step: they belong to the middle of it.
+    acting = time + (time[1] - time[0]) / runner.divisor / 2
+    both = np.concatenate([run.force_A, run.force_B], axis=1)[window]
+    loads, _ = polynomials(acting, both, FIELD_DEGREES, at)
+    motion = polynomials(time, run.x[window], FIELD_DEGREES, at)
+    return np.concatenate([*motion, loads], axis=1)
 
 
 def turns_or_hovers(case: Case, run: Trajectory, window: slice) -> bool:
@@ -528,7 +538,7 @@ def impacts(runner: Runner, sets: Sets, records: Records) -> Measured:
     for landing in (yield from carry_out(runner, pairs)):
         tasks[landing.pair.set] += landing.tasks
         for run in (landing.coarse, landing.fine):
-            gap = run.y if landing.pair.name.startswith("floor") else run.h
+            gap = run.y if _meets_floor(landing.pair) else run.h
             low = int(np.argmax(np.append(np.diff(gap) >= 0, True)))
             rebounds[landing.pair.set] += bool(gap[low:].max() > gap[low] + 1e-2 * landing.pair.p.R)
         if found := (yield from _after_landing(landing)):
@@ -549,11 +559,17 @@ def impacts(runner: Runner, sets: Sets, records: Records) -> Measured:
         yield runner.measurement(name, p, "rebounds", count, tasks[name])
 
 
+def _meets_floor(pair: StepPair) -> bool:
+    """Whether a ball lands on the floor, which is nearer at first, and not on the wall."""
+    x = State.of(pair.x0)
+    return bool(x.y < x.h)
+
+
 def _after_landing(landing: StepPairResult) -> Found[tuple[int, float] | None]:
     """The sample six coarse steps after a landing, and the largest change of what it changes, in
     natural units, with half the step."""
     pair, coarse, fine = landing.pair, landing.coarse, landing.fine
-    contact = [case.A if pair.name.startswith("floor") else case.B for case in coarse.cases]
+    contact = [case.A if _meets_floor(pair) else case.B for case in coarse.cases]
     at = next((k for k, each in enumerate(contact) if each is not Contact.N), len(contact)) + 6
     if at >= len(contact) or coarse.case[at] != fine.case[2 * at]:
         yield landing.missing(
