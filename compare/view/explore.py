@@ -29,7 +29,7 @@ from analytic.bifurcation import diagram as bifurcation
 from analytic.bifurcation.diagram import Exists
 from analytic.flowmeter import real_fluid
 from compare.branches import slipping_curve, stable_ends
-from compare.kit import steady
+from compare.kit import compiling, steady
 from compare.kit.doubt import model_warning, torque_left_out
 from compare.kit.pages import typeset
 from compare.kit.style import COLOURS
@@ -484,5 +484,12 @@ def _motion(ui: Any, tab: Tab) -> Callable[[], None]:
                 f"getHtmlElement({within.id}).contentWindow.postMessage({frames}, origin)"
             )
 
+    def say_why_nothing_moves() -> None:
+        if tab.run:
+            waits.cancel()
+        elif said := compiling.now():
+            line.set_content(f"The motion waits: {said}.")
+
+    waits = ui.timer(compiling.OFTEN, say_why_nothing_moves)
     within.on("load", play)
     return play

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import urllib.error
 import urllib.request
+from contextlib import contextmanager
 from pathlib import Path
 from urllib.parse import parse_qsl
 
@@ -18,6 +19,7 @@ from PIL import Image
 
 import analytic
 import mjsim
+from compare.kit import compiling
 from compare.view import explore, geometry, page
 from model import Case, InputError, Parameters, State, storage
 from tests.commands import refused, started, told
@@ -133,9 +135,9 @@ def test_what_cannot_be_shown(run, tmp_path, monkeypatch, name, options, message
     assert not list(tmp_path.iterdir())
 
 
-@pytest.fixture(scope="module")
-def address():
-    """Of a server of its own, which Ctrl-C must end."""
+@contextmanager
+def served():
+    """The address of a server of its own, which Ctrl-C must end."""
     pytest.importorskip("nicegui")
     with socket.socket() as free:
         free.bind((explore.HOST, 0))
@@ -148,11 +150,30 @@ def address():
                 if tried.connect_ex((explore.HOST, port)) == 0:
                     break
             signal.sigtimedwait([], 0.1)
-        yield f"http://{explore.HOST}:{port}/"
-        server.send_signal(signal.SIGINT)
+        try:
+            yield f"http://{explore.HOST}:{port}/"
+        finally:
+            server.send_signal(signal.SIGINT)
         _, error = server.communicate(timeout=20)
         assert server.returncode == 130
         assert "Traceback" not in error
+
+
+@pytest.fixture(scope="module")
+def address():
+    with served() as found:
+        yield found
+
+
+@pytest.mark.slow
+def test_a_page_whose_motion_waits_for_numba_says_so(browser, tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    with served() as address:
+        page = browser.new_page()
+        page.goto(address)
+        shows(page, ".steady", f"The motion waits: {compiling.KEPT}.")
+        shows(page, ".steady", "After 10 s: ")
+        page.close()
 
 
 def test_what_is_moved_clicked_and_typed_shows_and_is_saved(browser, address, tmp_path):
