@@ -29,7 +29,7 @@ UNKNOWN = (LookupError, InputError, NoOrbitError, SimulationError)
 
 ENOUGH = 2 / 3
 """Part of the numbers of each criterion that must be able to tell."""
-SILENT = "its protocol measured nothing, and does not say why"
+SILENT = "its protocol measured less than is planned, and does not say why"
 
 _computed = functools.cache(lambda function, *args, **options: function(*args, **options))
 

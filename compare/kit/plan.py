@@ -1,4 +1,4 @@
-"""What is measured, by whom, on which sets, and with which time steps: one table."""
+"""What is measured, by whom, on which sets, with which steps, how many numbers: one table."""
 
 from __future__ import annotations
 
@@ -56,6 +56,10 @@ class Entry:
     """Whether an engine beside the one on trial looks where that one found something."""
     only: str = ""
     """Why it needs the set `reference`, and no other; empty if it takes all sets."""
+    numbers: int = 1
+    """How many numbers there must be of a set at the quick level with the protocol's own time step,
+    measured or left out with a reason: the least that any set has by MuJoCo, event-driven
+    simulation or time stepping."""
     seconds: float = 1.0
     """Processor time at the quick level on some machine, of the engine on trial."""
 
@@ -68,33 +72,39 @@ PLAN: dict[str, Entry] = {
     # What is a single long run begins first: beside it there is work for the other workers. Then
     # what takes longest.
     # protocol          on trial, quick   in the limit     steps   as it comes
-    "recurrent":  Entry(ONE_BALL, only=HOPS, seconds=12),
-    "stepped":    Entry(ONE_BALL, only=HOPS, by=MOREAU),
-    "choice":     Entry(ONE_BALL,         ONE_BALL,        (4, 4), seconds=6,
+    "recurrent":  Entry(ONE_BALL, only=HOPS, numbers=3, seconds=12),
+    "stepped":    Entry(ONE_BALL, only=HOPS, by=MOREAU, numbers=3),
+    "choice":     Entry(ONE_BALL,         ONE_BALL,        (4, 4), numbers=2, seconds=6,
                         only="it is one of balls with mu > 1"),
-    "thresholds": Entry(VARIED,           LIMIT_SETS,       (3, 4), seeded=True, seconds=42),
-    "settled":    Entry(VARIED,           LIMIT_SETS,       (4, 4), ONE_BALL, seconds=21),
-    "edge":       Entry(("reference", "rough-floor"), seconds=15),
-    "rates":      Entry((*DRAG_LAWS, "high-wall-friction", "thick-fluid"), ONE_BALL, seconds=9),
-    "pulsation":  Entry(DRAG_LAWS,        ONE_BALL, seconds=23),
-    "slope":      Entry(VARIED,           ONE_BALL, seconds=15),
-    "unsteady":   Entry(DRAG_LAWS,        ONE_BALL, seconds=12),
-    "unloading":  Entry(ENDS_OF_ROLLING, seconds=4),
-    "laws":       Entry(VARIED,           ONE_BALL, settles=False, seconds=5),
+    "thresholds": Entry(VARIED,           LIMIT_SETS,       (3, 4),
+                        seeded=True, numbers=5, seconds=42),
+    "settled":    Entry(VARIED,           LIMIT_SETS,       (4, 4), ONE_BALL,
+                        numbers=88, seconds=21),
+    "edge":       Entry(("reference", "rough-floor"), numbers=5, seconds=15),
+    "rates":      Entry((*DRAG_LAWS, "high-wall-friction", "thick-fluid"), ONE_BALL,
+                        numbers=89, seconds=9),
+    "pulsation":  Entry(DRAG_LAWS,        ONE_BALL, numbers=8, seconds=23),
+    "slope":      Entry(VARIED,           ONE_BALL, numbers=2, seconds=15),
+    "unsteady":   Entry(DRAG_LAWS,        ONE_BALL, numbers=3, seconds=12),
+    "unloading":  Entry(ENDS_OF_ROLLING, numbers=9, seconds=4),
+    "laws":       Entry(VARIED,           ONE_BALL, settles=False, numbers=6, seconds=5),
     "plane":      Entry(ONE_BALL, only="the planes of Figs. 7 and 8 are those of reference only",
-                        seconds=12),
+                        numbers=24, seconds=12),
     "birth":      Entry(VARIED, seconds=5),
-    "bounds":     Entry(VARIED,           ONE_BALL, seconds=6),
-    "mirrored":   Entry(ONE_BALL,         ONE_BALL, seconds=0.4),
-    "growth":     Entry(VARIED,           LIMIT_SETS, settles=False, seconds=7),
+    "bounds":     Entry(VARIED,           ONE_BALL, numbers=18, seconds=6),
+    "mirrored":   Entry(ONE_BALL,         ONE_BALL, numbers=38, seconds=0.4),
+    "growth":     Entry(VARIED,           LIMIT_SETS, settles=False, numbers=20, seconds=7),
     "steepest":   Entry(VARIED,           LIMIT_SETS, settles=False, seconds=7),
-    "lift":       Entry(VARIED,           ENDS_OF_ROLLING, (4, 4), settles=False, seconds=3),
-    "field":      Entry(VARIED,           LIMIT_SETS, free=ONE_BALL, settles=False, seconds=7),
-    "motions":    Entry(ONE_BALL,         ONE_BALL, settles=False, seconds=1.5),
-    "runs":       Entry(DRAG_LAWS,        ONE_BALL, free=ONE_BALL, settles=False, seconds=1.7),
+    "lift":       Entry(VARIED,           ENDS_OF_ROLLING, (4, 4),
+                        settles=False, numbers=5, seconds=3),
+    "field":      Entry(VARIED,           LIMIT_SETS,
+                        free=ONE_BALL, settles=False, numbers=264, seconds=7),
+    "motions":    Entry(ONE_BALL,         ONE_BALL, settles=False, numbers=240, seconds=1.5),
+    "runs":       Entry(DRAG_LAWS,        ONE_BALL,
+                        free=ONE_BALL, settles=False, numbers=116, seconds=1.7),
     "torque":     Entry(ONE_BALL,         ONE_BALL,        (4, 4), seconds=1),
-    "impacts":    Entry(ENDS_OF_ROLLING,  ONE_BALL, settles=False, seconds=0.4),
-    "hysteresis": Entry(ONE_BALL,         ONE_BALL,        (4, 4), seconds=2),
+    "impacts":    Entry(ENDS_OF_ROLLING,  ONE_BALL, settles=False, numbers=37, seconds=0.4),
+    "hysteresis": Entry(ONE_BALL,         ONE_BALL,        (4, 4), numbers=22, seconds=2),
     "followed":   Entry(ONE_BALL, level=Level.DEFAULT, only=HOPS),
     "rebounding": Entry(ONE_BALL, level=Level.DEFAULT, only=HOPS, by=MOREAU),
     "swing":      Entry(ONE_BALL, level=Level.DEFAULT,

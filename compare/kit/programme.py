@@ -179,6 +179,23 @@ def run(jobs: Sequence[Job]) -> Iterator[tuple[Job, Records | Exception]]:
             raise
 
 
+def lacking(job: Job, rows: Sequence[Measurement | Missing]) -> Counter[Planned]:
+    """How many planned numbers a protocol lacks without a word: of a set of which it says nothing
+    at least one; of the sets of the quick level those up to `Entry.numbers`."""
+    name, entry, counts = job.protocol.name, PLAN[job.protocol.name], Counter[str]()
+    for row in rows:
+        counts[row.set] += max(row.rows, 1) if isinstance(row, Missing) else 1
+    by = job.runner
+    whole = job.chosen is None and by.level is Level.QUICK and not by.has_own_steps
+    least = entry.numbers if whole else 1
+    if entry.only:  # it may have sets of its own
+        ours = [each for each in entry.trial if each in job.sets]
+        return +Counter({Planned(name, each, ""): least - counts.total() for each in ours})
+    if not whole and not counts.keys() <= job.sets.keys():
+        return Counter()
+    return +Counter({Planned(name, each, ""): least - counts[each] for each in job.sets})
+
+
 def carry_out(job: Job, before: Records) -> Records:
     """What a protocol measures after others; what is kept is not measured again.
 
@@ -209,11 +226,7 @@ def carry_out(job: Job, before: Records) -> Records:
             if isinstance(row, Measurement) and protocol.drawn(row) and not runner.has_own_steps:
                 rows[k] = replace(row, runs=tuple(f"{place}/{key}" for key in row.runs))
         records = Records.of(rows)
-        said = {row.set for row in rows}
-        if said <= job.sets.keys():  # else the protocol has sets of its own
-            asked = [name for name in job.sets if not entry.only or name in entry.trial]
-            silent = (Planned(protocol.name, name, "") for name in asked if name not in said)
-            records = replace(records, planned=records.planned + Counter(silent))
+        records = replace(records, planned=records.planned + lacking(job, rows))
         drawn = (run for m in records.measurements for run in m.runs if "/" in run)
         campaign.keep({run.rpartition("/")[2] for run in drawn})
         record.save(records, path, asdict(job.origin))

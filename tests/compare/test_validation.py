@@ -211,6 +211,21 @@ def test_a_set_of_which_nothing_is_said_is_counted(found_by):
     assert found.lost == {("round", "third", ""): 1}
 
 
+def test_numbers_that_are_planned_and_do_not_come_are_counted(runner, tmp_path, monkeypatch):
+    """At the quick level, of the sets of the study."""
+
+    def measure(runner, sets, before):
+        for _ in range(3):
+            yield from going_round(runner, sets, before)
+        yield Missing("round", "blunt", "it has a reason", 2)
+
+    monkeypatch.setitem(PLAN, "round", Entry(("reference", "blunt"), numbers=5))
+    job = Job(Protocol("round", measure), runner, tmp_path)
+    assert programme.carry_out(job, Records()).lost == {("round", "reference", ""): 2}
+    monkeypatch.setitem(PLAN, "round", Entry(("reference",), only=ALONE, numbers=20))
+    assert programme.lacking(job, [Missing("round", "own", "why", 19)]).total() == 1
+
+
 ALONE = "it is that of the reference"
 
 
