@@ -66,7 +66,8 @@ def _measured(name: str, verdict: Verdict | None, summary: Summary) -> list[Link
     first = " ".join(about.split("\n\n")[0].split())
     chain = [Link("measured by", f"protocol {name}: {first}", place(protocol.measure))]
     entry = plan.PLAN[name]
-    sets = f"{', '.join(entry.trial)} at the quick level, all sets above"
+    sets = f"{', '.join(entry.trial)} at the quick level, {entry.numbers} numbers of each or more; "
+    sets += "all sets above"
     if entry.level > Level.QUICK:
         sets = f"from the {entry.level.name.lower()} level on"
     chain.append(Link("planned on", sets, _line(plan, f'"{name}":')))
