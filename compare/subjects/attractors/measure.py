@@ -307,7 +307,10 @@ def swing(runner: Runner, sets: Sets, records: Records) -> Measured:
     if any(np.any(run.case[run.time > end] != Case.SS) for run in (result.coarse, result.fine)):
         yield runner.missing("reference", "the ball does not slip at both points for ever")
         return
-    begun = (result.coarse, end), (result.fine, end), (result.fine, end - SWUNG)
+    # a disturbance that halves in half of the run has left less than it lost since (chosen after
+    # the part just before had shown a quarter of that)
+    half = SWINGING / 2 - SWUNG
+    begun = (result.coarse, end), (result.fine, end), (result.fine, half)
     parts = [_swing(run, start) for run, start in begun]
     at = state_of(constrained(Case.SS, result.fine.x[-1], p)) | Conditions(period=parts[1][0])
     names = "swing_period", "swing_omega_c", "swing_size"
