@@ -73,10 +73,12 @@ def write_text(path: Path, text: str) -> None:
 
 @contextmanager
 def reading_json(path: Path, what: str) -> Iterator[Any]:
-    """What a JSON file holds; an error within the context is a `StorageError` that says it isn't
-    what it should be."""
+    """The object that a JSON file holds; an error within the context is a `StorageError` that says
+    it isn't what it should be."""
     try:
-        yield json.loads(path.read_text("utf-8"))
+        if not isinstance(content := json.loads(path.read_text("utf-8")), dict):
+            raise TypeError("it is no JSON object")
+        yield content
     except OSError as error:
         raise StorageError(f"cannot read {path}: {error.strerror}") from error
     except (ValueError, KeyError, TypeError, AttributeError) as error:

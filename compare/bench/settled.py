@@ -18,7 +18,7 @@ import numpy as np
 from compare.bench.contact_law import Array, SoftContacts
 from model import InputError, StorageError
 from model.errors import few
-from model.parameters import ANY, POSITIVE, Range, check_number, parse_number
+from model.parameters import ANY, Range, check_number, parse_number
 
 Control = Callable[[Any, Any], None]
 """Sets `data.ctrl`, or any force, of a model and its data, maybe copies, before a step."""
@@ -34,6 +34,8 @@ RESTLESS, JOLT, TURNING = 0.3, 1e-3, 0.05
 """A body moves on if its speed changes by this share, or this (m/s), or it turns so, rad."""
 WINDOW, WINDOW_STEPS = 0.1, 50
 """A window is so long, s, and of so many steps."""
+SHORTEST = 1e-7
+"""Of a time step, s: a million in a window."""
 BENT, SUNK = 0.3, 0.1
 """A robot has collapsed if a driven joint turned so, rad, and it sank by this share of its size."""
 BAD = [getattr(mujoco.mjtWarning, f"mjWARN_BADQ{name}") for name in ("POS", "VEL", "ACC")]
@@ -62,7 +64,7 @@ def load(path: Path, keyframe: str | None = None) -> tuple[Any, Any]:
     """A model and its state, at a keyframe by name or number.
 
     Raises `StorageError` if there is no such file, `InputError` if MuJoCo refuses it, it is huge,
-    it has no such keyframe, or its time step is no positive number."""
+    it has no such keyframe, or its time step is shorter than `SHORTEST`."""
     if not path.is_file():
         why = "it is a directory" if path.is_dir() else "there is no such file"
         raise StorageError(f"cannot read {path}: {why}")
@@ -74,7 +76,7 @@ def load(path: Path, keyframe: str | None = None) -> tuple[Any, Any]:
         _check_sizes(_heightfields(path))
         _check_sizes(_sizes(mujoco.MjSpec.from_file(name)))
         model = mujoco.MjModel.from_xml_path(name)
-        check_number("timestep", model.opt.timestep, "s", POSITIVE)
+        check_number("timestep", model.opt.timestep, "s", Range(SHORTEST))
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
     except ValueError as error:
@@ -137,7 +139,10 @@ def set_controls(model: Any, data: Any, values: Sequence[str]) -> None:
                 f"--ctrl needs NAME=NUMBER, or as many numbers as there are actuators: {model.nu}"
             )
         given = list(zip(names, values, strict=True))
+    named = [name for name, _ in given]
     for name, text in given:
+        if named.count(name) > 1:
+            raise InputError(f"--ctrl names {name} twice")
         if name not in names:
             others = few(names) or "none at all"
             raise InputError(f"--ctrl: there is no actuator {name!r}, but {others}")

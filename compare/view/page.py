@@ -60,7 +60,7 @@ def save(
     times = np.arange(at, until + 1e-12, step)
     moves = frames(run, times, tell)
     write_bytes(output, write(run.header.parameters, speed, moves, run).encode())
-    return f"{output}: {len(times)} frames"
+    return f"{output}: {len(times)} frame{'s' * (len(times) != 1)}"
 
 
 def frames(

@@ -109,5 +109,5 @@ def test_the_command_draws_the_map_or_keeps_its_data(tmp_path, capsys):
     told(capsys, f"{line} -o {tmp_path / 'map.json'}")
     assert Basins.load(tmp_path / "map.json").parameters.omega_0 == 40.0
     (tmp_path / "map.json").write_text("[]", "utf-8")
-    with pytest.raises(StorageError, match="holds no basins"):
+    with pytest.raises(StorageError, match="holds no basins: it is no JSON object"):
         Basins.load(tmp_path / "map.json")

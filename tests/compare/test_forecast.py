@@ -362,7 +362,8 @@ REFUSED = {
     mjcf(GROUND + CLOTH): (2, "nothing touches.*16 contacts of flexible bodies are left out"),
     mjcf(SLOPE + ROUND): (1, "still moves: body 'ball' at"),
     mjcf(LEVEL.replace('"/></body>', '" /><joint/></body>')): (2, "MuJoCo refuses it"),
-    mjcf(LEVEL, 'timestep="0"'): (2, "scene.xml: timestep = 0 s is out of range: must be > 0"),
+    mjcf(LEVEL, 'timestep="0"'): (2, "scene.xml: timestep = 0 s is out of range: must be >= 1e-07"),
+    mjcf(LEVEL, 'timestep="1e-12"'): (2, "scene.xml: timestep = 1e-12 s is out of range"),
     mjcf(LEVEL, rest='<asset><hfield name="h" nrow="5001" ncol="5000" size="1 1 1 1"/></asset>'): (
         2,
         "scene.xml: heightfield 'h' has 5001 x 5000 points; 2.5e.07 are the most",
@@ -512,6 +513,7 @@ def test_controls_come_by_number_name_or_keyframe_and_bad_ones_get_one_line(fore
         "as many numbers as there are actuators: 2": ["--ctrl", "5"],
         "needs NAME=NUMBER, or": ["--ctrl", "5", "r=5"],
         "no actuator 'thumb', but l, r": ["--ctrl", "thumb=5"],
+        "--ctrl names l twice": ["--ctrl", "l=5", "l=6"],
         "l = 'five' must be a number": ["--ctrl", "l=five"],
         "l = nan must be finite": ["--ctrl", "l=nan"],
         "l = 10 is out of range: must be >= -9 and <= 9": ["--ctrl", "l=10"],
