@@ -8,6 +8,8 @@ from pathlib import Path
 from types import FrameType
 from typing import NoReturn
 
+from compare.stops import SIGNALS
+
 
 def main() -> NoReturn:
     """The program; what ends it while it is being imported ends it at once: nothing is lost."""
@@ -25,7 +27,7 @@ def main() -> NoReturn:
     if not sys.stdout or not sys.stderr:
         nowhere = Path(os.devnull).open("w")  # noqa: SIM115  (for as long as the process lasts)
         sys.stdout, sys.stderr = sys.stdout or nowhere, sys.stderr or nowhere
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, leave)
     from compare.commands.cli import program

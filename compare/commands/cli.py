@@ -2,7 +2,7 @@
 
 Exit codes: 0 done and as expected, 1 a verdict on the engine on trial failed, a run broke down or
 a design doesn't reach its fastest flow, 2 a mistake in what was asked, 130 interrupted by Ctrl-C,
-143 by SIGTERM."""
+143 by SIGTERM, 129 by a terminal that is closed, 152 where processor time is used up."""
 
 from __future__ import annotations
 
@@ -48,11 +48,7 @@ def program() -> NoReturn:
         except OSError as error:  # nobody reads it, as with `| head`, or the disk is full
             os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
             if code == 0 and not isinstance(error, BrokenPipeError):
-                print(
-                    f"dualball: error: cannot write to standard output: {error.strerror}",
-                    file=sys.stderr,
-                )
-                code = 2
+                code = _ended(2, f"error: cannot write to standard output: {error.strerror}")
         if code >= 128:  # threads may still be at what nobody wants any more
             gc.collect()  # lets go of what workers shared
             leave(code)
@@ -75,25 +71,28 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         return _run(sys.argv[1:] if argv is None else argv, args)
     except InputError as error:
-        print(f"dualball: error: {_brief(str(error))}", file=sys.stderr)
-        return 2
+        return _ended(2, f"error: {_brief(str(error))}")
     except SimulationError as error:
-        print(f"dualball: {error}", file=sys.stderr)
-        return 1
+        return _ended(1, str(error))
     except BrokenPipeError:  # `program` sees to it
         return 0
     except OSError as error:  # the machine can't do it: of what a user named `StorageError` tells
         full = "cannot write to standard output" if error.errno == errno.ENOSPC else ""
         said = [str(each) for each in (error.filename or full, error.strerror or error) if each]
-        print(f"dualball: error: {': '.join(said)}", file=sys.stderr)
-        return 2
+        return _ended(2, f"error: {': '.join(said)}")
     except KeyboardInterrupt as error:
         kept = ""
         if args.resumes and args.output.is_dir():
             kept = f"; what is done is kept in {args.output}, the same command goes on from there"
-        with suppress(OSError):  # nobody reads it any more, as where what began this is gone
-            print(f"dualball: interrupted{kept}", file=sys.stderr)
-        return error.code if isinstance(error, signals.Interrupted) else 130
+        code = error.code if isinstance(error, signals.Interrupted) else 130
+        return _ended(code, f"interrupted{kept}")
+
+
+def _ended(code: int, said: str) -> int:
+    """Say why a command ended with an exit code, and return that."""
+    with suppress(OSError):  # nobody reads it any more, as where the terminal is gone
+        print(f"dualball: {said}", file=sys.stderr)
+    return code
 
 
 def _run(argv: Sequence[str], args: argparse.Namespace) -> int:

@@ -1,4 +1,4 @@
-"""Ctrl-C, and SIGTERM as of clusters: both end a command with one line; what is done is kept."""
+"""What ends a program ends a command with one line; what is done is kept."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import NoReturn
 
+from compare.stops import SIGNALS
 from model.files import leave
 
-_BOTH = (signal.SIGINT, signal.SIGTERM)
 _PATIENCE = 2.0
 """Of what is to stop by itself, s."""
 _WAITS = 200
@@ -37,7 +37,7 @@ def on_first_signal(
 
     Yields how to listen again. Signals that are ignored stay so, as in what a shell runs in the
     background; and all in a thread, which gets none."""
-    here = _BOTH if threading.current_thread() is threading.main_thread() else ()
+    here = SIGNALS if threading.current_thread() is threading.main_thread() else ()
     before = {
         each: handler for each in here if (handler := signal.getsignal(each)) is not signal.SIG_IGN
     }

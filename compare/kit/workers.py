@@ -27,6 +27,7 @@ from multiprocessing.connection import Connection
 from typing import Any, Self, TypeVar
 
 from compare.kit import compiling
+from compare.stops import SIGNALS
 from model import InputError, StorageError
 from model.files import leave
 from model.parameters import Range, check_number
@@ -34,8 +35,6 @@ from model.parameters import Range, check_number
 T = TypeVar("T")
 Spread = Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[Any]]
 """A function that is called like `map`."""
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
-"""Ctrl-C, and what clusters send."""
 JUDGING = 30.0
 """Processor time that judging a claim or drawing a figure may take, s: thirty times what the
 longest takes at the quick level. What files say may be nonsense that takes years."""
@@ -110,7 +109,8 @@ def processes(count: int) -> Workers:
         # inherited by the workers; numpy reads it when they import it
         for library in ("OMP", "OPENBLAS", "MKL"):
             os.environ.setdefault(f"{library}_NUM_THREADS", "1")
-        resource_tracker.ensure_running()  # it lets signals through
+        with _without_signals():
+            resource_tracker.ensure_running()  # it lets Ctrl-C and SIGTERM through
         with _without_signals():  # a semaphore that is half made would be left
             return _Pool(count)
 
@@ -182,7 +182,7 @@ def _call_in_worker(fn: Callable[..., T], *args: Any, **kwargs: Any) -> T:
 
 
 def _follow_parent(end: Connection, told: Connection) -> None:
-    """In a worker: leave Ctrl-C to the parent, tell it of compiling, and end with it, or when it
+    """In a worker: leave signals to the parent, tell it of compiling, and end with it, or when it
     says so."""
 
     def wait_for_parent() -> None:
@@ -192,7 +192,8 @@ def _follow_parent(end: Connection, told: Connection) -> None:
             _between.acquire()
         leave(1)
 
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
     # by the pool, where another worker died
     signal.signal(signal.SIGTERM, lambda number, frame: leave(1))
     if sys.platform != "win32":

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM end every command and every long call, with one line, and leave nothing that
+"""What ends programs ends every command and every long call, with one line, and leave nothing that
 is half written."""
 
 import contextlib
@@ -16,10 +16,10 @@ import pytest
 
 import mjsim
 from compare.commands import cli, signals, simulate
+from compare.stops import SIGNALS
 from model import Parameters
 from tests.commands import COMMANDS, carried_out, python, started
 
-SIGNALS = signal.SIGINT, signal.SIGTERM
 P = Parameters.named("reference")
 LONG = {
     "validate": "--quick --set reference --claim prop-1",
@@ -76,8 +76,9 @@ ALL = [
     ("command", "number", "after"),
     [
         *(("attractors", signal.SIGINT, 3.0), ("basins", signal.SIGTERM, 3.0)),
+        ("sweep", signal.SIGHUP, 2.0),
         # Python and packages are being loaded, each time a little further: no traceback of theirs.
-        *((command, SIGNALS[k % 2], 0.03 * k) for k, command in enumerate(COMMANDS)),
+        *((command, SIGNALS[k % len(SIGNALS)], 0.03 * k) for k, command in enumerate(COMMANDS)),
         *(pytest.param(*each, marks=pytest.mark.slow) for each in ALL),
     ],
 )
