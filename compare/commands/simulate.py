@@ -31,6 +31,11 @@ def run(args: argparse.Namespace) -> int:
     """Simulate one run, store it as far as it came, and describe it."""
     p, flow = options.parameters(args), running.flow(args)
     args.time = args.time or DURATION
+    if args.flow and flow and flow.start[0] >= args.time:
+        raise InputError(
+            f"{args.flow} begins at t = {flow.start[0]:.10g} s, but the run, from 0 on, ends at "
+            f"{args.time:g} s: shift its times, or give a longer --time"
+        )
     task = running.task(args, p, flow=flow)
     with tempfile.TemporaryDirectory() as scratch:
         as_table = options.is_table(args.output)

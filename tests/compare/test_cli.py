@@ -127,6 +127,13 @@ def test_flows(tmp_path, monkeypatch, capsys, flow, last):
     assert storage.load("run.h5").header.flow(0.3) == pytest.approx(last)
 
 
+def test_a_flow_that_begins_after_the_run_is_refused(tmp_path, capsys):
+    """As one with the times of a clock: the ball would meet its first value alone."""
+    (clock := tmp_path / "clock.csv").write_text("1700000000, 3\n1700000001, 9\n")
+    said = refused(capsys, "simulate", "--flow", clock, "--time", 5)
+    assert "begins at t = 1700000000 s, but the run, from 0 on, ends at 5 s" in said
+
+
 @pytest.mark.parametrize("design", ["--vary eta=0.1,0.5", "--vary eta=0.1:0.5 --random 2"])
 def test_each_set_of_a_sweep_has_contacts_that_suit_it(tmp_path, capsys, design):
     """Fast contacts would chatter where mu eta is large; on the other set they are the defaults."""
