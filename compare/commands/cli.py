@@ -15,6 +15,7 @@ import itertools
 import os
 import re
 import sys
+import traceback
 import warnings
 from collections.abc import Sequence
 from contextlib import nullcontext, suppress
@@ -80,12 +81,29 @@ def main(argv: Sequence[str] | None = None) -> int:
         full = "cannot write to standard output" if error.errno == errno.ENOSPC else ""
         said = [str(each) for each in (error.filename or full, error.strerror or error) if each]
         return _ended(2, f"error: {': '.join(said)}")
+    except Exception as error:
+        if library := _refuses_to_load(error):
+            return _ended(2, f"error: {library} can't be loaded: {' '.join(str(error).split())}")
+        raise
     except KeyboardInterrupt as error:
         kept = ""
         if args.resumes and args.output.is_dir():
             kept = f"; what is done is kept in {args.output}, the same command goes on from there"
         code = error.code if isinstance(error, signals.Interrupted) else 130
         return _ended(code, f"interrupted{kept}")
+
+
+_OURS = "model", "analytic", "mjsim", "compare"
+
+
+def _refuses_to_load(error: Exception) -> str:
+    """The library that raised an error while it was imported, as for what the environment has; else
+    nothing."""
+    frames = [frame for frame, _ in traceback.walk_tb(error.__traceback__)]
+    packages = [frame.f_globals.get("__name__", "").partition(".")[0] for frame in frames]
+    first = max(k for k, package in enumerate(packages) if package in _OURS) + 1
+    loads = first < len(frames) and frames[first].f_code.co_name == "<module>"
+    return packages[first] if loads else ""
 
 
 def _ended(code: int, said: str) -> int:

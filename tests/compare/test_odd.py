@@ -28,7 +28,7 @@ import pytest
 from compare.bench import settled
 from compare.commands import cli, options
 from model import InputError
-from tests.commands import COMMANDS, NEEDED, ROOT, parser_of, refused
+from tests.commands import COMMANDS, NEEDED, ROOT, parser_of, refused, started
 
 ODD = ["", *"x nan -inf 0 -1 1e300 1e-300 1,5 ½ 1_000 0x10 99999999999999999999".split()]
 USUAL = "1 2 0.01 0.3".split()
@@ -419,6 +419,16 @@ def test_a_name_that_mujoco_cannot_read_is_refused(tmp_path):
     scene.write_text("<mujoco/>")
     with pytest.raises(InputError, match="no name but in UTF-8"):
         settled.load(scene)
+
+
+def test_what_a_library_refuses_as_it_is_loaded_is_one_line(monkeypatch):
+    monkeypatch.setenv("NUMBA_NUM_THREADS", "0")
+    with started("simulate", "--engine", "event", stderr=subprocess.PIPE) as process:
+        assert process.communicate() == (
+            "",
+            "dualball: error: numba can't be loaded: Number of threads specified must be > 0.\n",
+        )
+    assert process.returncode == 2
 
 
 def test_a_directory_that_was_deleted_is_one_line(tmp_path):
