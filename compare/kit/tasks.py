@@ -155,13 +155,15 @@ def store(
         failure = run.header.failure
         storage.save(run, failed_path(path) if failure else path)
     else:
-        under_way, stopped = _start_stream(task, progress=tell), ""
+        under_way, stopped, reached = _start_stream(task, progress=tell), "", 0.0
         with storage.TrajectoryWriter(path, under_way.header) as writer:
             for block in under_way:
                 check(0.0)
                 writer.append(block)
+                # between rare samples blocks are empty
+                reached = block["time"].max(initial=reached)
                 if stop():
-                    stopped = f"was stopped at t = {block['time'].max(initial=0.0):g} s"
+                    stopped = f"was stopped at t = {reached:g} s"
                     break
             failure = under_way.header.failure or stopped
             writer.end(under_way.events, failure, failed_path(path) if failure else path)

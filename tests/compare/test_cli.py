@@ -175,16 +175,18 @@ def test_a_run_that_diverges_is_kept_and_told(tmp_path, monkeypatch, capsys):
     assert [path.name for path in tmp_path.iterdir()] == ["run.h5"]
 
 
-def test_an_interrupted_run_is_kept(tmp_path, monkeypatch, capsys):
-    """By Ctrl-C in the second block of steps; the same command then makes it whole."""
+@pytest.mark.parametrize(("interval", "block"), [(0.004, 2), (20.0, 8)])
+def test_an_interrupted_run_is_kept(tmp_path, monkeypatch, capsys, interval, block):
+    """By Ctrl-C in a later block of steps, which may be without a sample; the same command then
+    makes it whole."""
     store, file = tasks.store, tmp_path / "run.h5"
-    line = f"simulate --time 90 --sample-interval 0.004 -o {file}"
+    line = f"simulate --time 90 --sample-interval {interval} -o {file}"
 
     def pressing(task, path, stop, **given):
         blocks = itertools.count(1)
 
         def pressed():
-            if next(blocks) == 2:
+            if next(blocks) == block:
                 signal.raise_signal(signal.SIGINT)
             return stop()
 
