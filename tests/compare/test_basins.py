@@ -12,7 +12,7 @@ from compare.kit.sweep import Axis
 from compare.subjects.attractors.basins import ATTRACTORS, Basins, basins
 from docs.studies.search import BOX, KEPT, confirm, parameters, random_starts, screen
 from model import Parameters, StorageError, storage
-from tests.commands import told
+from tests.commands import refused, told
 
 BISTABLE = Parameters.named("reference").replace(omega_0=40.0)
 
@@ -97,6 +97,12 @@ def test_basins_count_measure_and_keep_their_points(tmp_path):
     text = (tmp_path / "b.json").read_text("utf-8").replace('"attractors"', '"fates"')
     (tmp_path / "before.json").write_text(text, "utf-8")
     np.testing.assert_array_equal(Basins.load(tmp_path / "before.json").attractors, b.attractors)
+
+
+def test_a_step_that_is_too_long_for_mujoco_is_no_difference(tmp_path, capsys):
+    line = f"basins --across omega_c=0:500:2 --up y=0:.01:2 --mujoco 1 --results {tmp_path / 'b'}"
+    assert "half of 1/(2 omega_c)" in refused(capsys, f"{line} --timestep .002 --workers 0 --quiet")
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_command_draws_the_map_or_keeps_its_data(tmp_path, capsys):

@@ -24,7 +24,8 @@ from compare.kit.statistics import hops_on
 from compare.kit.sweep import Axis, check_size
 from compare.kit.tasks import Task
 from mjsim import RigidContacts
-from model import Case, Contact, InputError, Parameters, State
+from mjsim.engine import check_timestep
+from model import Case, Contact, Flow, InputError, Parameters, State
 from model.arrays import Array
 from model.files import reading_json, write_text
 from model.kinematics import VARIABLES
@@ -98,7 +99,8 @@ def basins(
     """Attractors after 10/c of starts on a plane of two state variables, across and up; all others
     as in `start`, or zero.
 
-    Raises `InputError` for an unknown variable, no drag, or an impossible start."""
+    Raises `InputError` for an unknown variable, no drag, an impossible start, or a time step that
+    doesn't resolve MuJoCo's."""
     across, up = plane
     check_names((*start, across.name, up.name), VARIABLES, "state variable")
     if across.name == up.name:
@@ -111,6 +113,8 @@ def basins(
     states = np.tile(base, (len(y), len(x), 1))
     states[..., VARIABLES.index(across.name)], states[..., VARIABLES.index(up.name)] = x, y[:, None]
     few = states[::coarse, ::coarse] if coarse else states[:0, :0]
+    for x0 in few.reshape(-1, len(VARIABLES)):  # a run that is refused would count as different
+        check_timestep(timestep, p, Flow.steady(p.omega_0), lasts, State.of(x0))
     tasks = [
         Task(
             engine=MUJOCO.name, parameters=p, x0=start_state(x0, p, Settings()), t_end=lasts,
