@@ -10,6 +10,7 @@ from __future__ import annotations
 import base64
 import errno
 import json
+import signal
 import socket
 import tempfile
 import time
@@ -33,6 +34,7 @@ from compare.kit import compiling, steady
 from compare.kit.doubt import model_warning, torque_left_out
 from compare.kit.pages import typeset
 from compare.kit.style import COLOURS
+from compare.stops import SIGNALS
 from compare.subjects.thresholds.figures import TINTS
 from compare.view import cases
 from compare.view import page as motion
@@ -268,6 +270,7 @@ def serve(p: Parameters, port: int, show: bool) -> None:
         from nicegui import Client, app, ui
         from starlette.middleware.trustedhost import TrustedHostMiddleware
         from starlette.responses import HTMLResponse
+        from uvicorn import server
 
         from compare.view import guard
     except ImportError as error:
@@ -296,6 +299,9 @@ def serve(p: Parameters, port: int, show: bool) -> None:
     app.add_middleware(guard.OwnOrigin)
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=[HOST, "localhost"])
     print(f"http://{HOST}:{port} (Ctrl-C ends it)", flush=True)
+    server.HANDLED_SIGNALS = tuple(
+        each for each in SIGNALS if signal.getsignal(each) is not signal.SIG_IGN
+    )
     quiet: dict[str, Any] = {
         "reload": False,
         "show_welcome_message": False,

@@ -76,7 +76,7 @@ ALL = [
     ("command", "number", "after"),
     [
         *(("attractors", signal.SIGINT, 3.0), ("basins", signal.SIGTERM, 3.0)),
-        ("sweep", signal.SIGHUP, 2.0),
+        *((command, signal.SIGHUP, 3.0) for command in ("sweep", "explore")),
         # Python and packages are being loaded, each time a little further: no traceback of theirs.
         *((command, SIGNALS[k % len(SIGNALS)], 0.03 * k) for k, command in enumerate(COMMANDS)),
         *(pytest.param(*each, marks=pytest.mark.slow) for each in ALL),
