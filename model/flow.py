@@ -197,7 +197,7 @@ class Flow:
             flow = cls._from_pieces(
                 str(values["kind"]), values["start"], values["value"], values["slope"]
             )
-            flow = replace(flow, waves=cls.sines(0.0, values.get("waves", ())).waves)
+            flow = replace(flow, waves=cls.sines(0.0, values["waves"]).waves)
         except (KeyError, TypeError, ValueError) as error:
             raise InputError(f"not a flow: {error}") from error
         if not flow.start.shape == flow.value.shape == flow.slope.shape or not np.all(

@@ -23,12 +23,12 @@ def protocols(directory: Path) -> dict[str, Records]:
     for path in sorted(directory.glob("measurements/*/*.h5")):
         with h5py.File(path) as file:
             about = json.loads(file.attrs["about"])
-        by = about.get("by", about["engine"])
+        by = about["by"]
         try:
             own = record.load(path)
         except InputError as error:  # as of a quantity that is measured no more
             own = Records(missing=(Missing(path.stem, "all sets", str(error)),))
-        found[f"{path.stem} by {by}, step/{about.get('step', 1)}"] = own
+        found[f"{path.stem} by {by}, step/{about['step']}"] = own
     return found
 
 

@@ -115,7 +115,6 @@ def _refuse_another_sweep(args: argparse.Namespace, p: Parameters) -> None:
     asked |= {"engine": args.engine.name} | dataclasses.asdict(p)
     if (path := args.output / "sweep.json").exists():
         with reading_json(path, "sweep") as held:
-            held = asked | held  # one of an earlier version lacks some
             differ = [
                 f"{name} = {held[name]}, not {value}"
                 for name, value in asked.items()

@@ -50,8 +50,8 @@ Save = Callable[[Mapping[str, Trajectory], Path], None]
 Ended = tuple[str, Path | None, Trajectory | None]
 """Why a run isn't whole, or empty; its file, if any; the run, if it has no file."""
 _BROKEN = ".failed.h5"
-_NAME = re.compile(r"(?:(.+)-)?([0-9a-f]{24})(\.failed)?\.h5")
-"""Label, ID, and whether it broke down; files of earlier versions have no label."""
+_NAME = re.compile(r".+-([0-9a-f]{24})(\.failed)?\.h5")
+"""Label, ID, and whether it broke down."""
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ class Campaign:
             if not (name := _NAME.fullmatch(file.name)):
                 continue
             try:
-                version, keys = storage.contents(file) if name[1] else ("", [])
+                version, keys = storage.contents(file)
             except StorageError as error:
                 file.replace(file.with_suffix(".damaged"))
                 what = f"{error}; it is set aside, its runs are carried out again"
@@ -141,7 +141,7 @@ class Campaign:
                 continue
             others += version != ours
             if version == ours:
-                self._files |= dict.fromkeys(keys or [name[2]], file)
+                self._files |= dict.fromkeys(keys or [name[1]], file)
         if others:
             left = f"{others} files of runs of other versions are left alone in {self.directory}"
             print(f"dualball: {left}", file=sys.stderr)

@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SCHEMA, SCHEMA_VERSION = "dualball-collection", 2
-"""The first version knew no grids."""
 MEANS, MEANS_VERSION = "dualball-means", 1
 """What a file of the means of a batch says of itself."""
 NAMED = 5
@@ -251,24 +250,20 @@ def _attributes() -> dict[str, dict[str, Any]]:
 
 
 def varied_parameters(of: Mapping[str, npt.NDArray[Any]]) -> list[str]:
-    """Names of parameters with several values; older files have no law of drag."""
-    return [
-        f.name
-        for f in dataclasses.fields(Parameters)
-        if f.name in of and len(np.unique(of[f.name])) > 1
-    ]
+    """Names of parameters with several values."""
+    return [f.name for f in dataclasses.fields(Parameters) if len(np.unique(of[f.name])) > 1]
 
 
 def read(path: Path) -> Columns:
     """The columns of a collection or batch, a row a run; none of a file that holds a single run.
 
-    Raises `StorageError` for one that is not whole or of a newer version."""
+    Raises `StorageError` for one that is not whole or of another version."""
     if path.parent.is_file():  # one run of a batch
         return {}
     with reading(path) as file:
         schema, version = (file.attrs.get(name) for name in ("schema", "schema_version"))
         if schema == SCHEMA:
-            if not isinstance(version, (int, np.integer)) or not 1 <= version <= SCHEMA_VERSION:
+            if version != SCHEMA_VERSION:
                 held = f"it is a collection of version {version!r}"
                 raise StorageError(f"{held}; this program reads {SCHEMA_VERSION}")
             of, run = {name: column(dataset(file, name)) for name in file}, dataset(file, "run")
@@ -323,8 +318,8 @@ def draw(of: Columns) -> Figure:
 
 
 def _parameters(of: Columns, k: int) -> Parameters:
-    """The parameters of the k-th run; older collections have not all of them."""
-    names = (f.name for f in dataclasses.fields(Parameters) if f.name in of)
+    """The parameters of the k-th run."""
+    names = (f.name for f in dataclasses.fields(Parameters))
     return Parameters(**{name: of[name][k : k + 1].tolist()[0] for name in names})
 
 
@@ -348,7 +343,7 @@ def describe(of: Columns) -> dict[str, Any]:
         "unsettled": int((off > steady.DRIFT).sum()),
         "drift": float(np.nanmax(off, initial=0.0)),
         "failures": [text for text in of["failure"].tolist() if text],
-        "drag": sorted(set(of["drag"].tolist())) if "drag" in of else [],
+        "drag": sorted(set(of["drag"].tolist())),
         "varied": varied_parameters(of),
         "ranges": {name: [float(v.min()), float(v.max())] for name, v in finite.items() if len(v)},
     }

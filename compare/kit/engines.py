@@ -287,9 +287,9 @@ def sliding_speeds(run: Trajectory) -> tuple[Array, Array]:
         return run.slip_speed_A, run.slip_speed_B
     m, kept = run.header.parameters.m, run.header.settings
     settings: ContactModel = RigidContacts(timestep=kept["timestep"])
-    if not kept.get("rigid", "solref" not in kept):  # as files of versions before have it
-        known = {f.name: kept[f.name] for f in fields(ContactSettings) if f.name in kept}
-        settings = ContactSettings.from_mapping(known)
+    if "solref" in kept:
+        own = {f.name: kept[f.name] for f in fields(ContactSettings)}
+        settings = ContactSettings.from_mapping(own)
     friction_A = np.hypot(run.force_A[:, 0], run.force_A[:, 2])
     friction_B = np.hypot(run.force_B[:, 1], run.force_B[:, 2])
     A = np.maximum(run.slip_speed_A - 1.01 * settings.creep_speed(friction_A / m), 0.0)

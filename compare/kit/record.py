@@ -339,7 +339,7 @@ def load(path: Path, **origin: Any) -> Records:
             )
             rows.append(row)
         planned = Counter[Planned]()
-        for protocol, of, name, count in json.loads(file.attrs.get("planned", "[]")):
+        for protocol, of, name, count in json.loads(file.attrs["planned"]):
             planned[Planned(protocol, of, name)] = count
         missing = (Missing(**each) for each in json.loads(file.attrs["missing"]))
         return Records(tuple(rows), tuple(missing), planned)

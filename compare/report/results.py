@@ -23,9 +23,6 @@ from model.versions import current_commit, current_versions
 
 SUMMARY, REPORT, RUNS = "summary.json", "report.html", "runs"
 SCHEMA, SCHEMA_VERSION = "dualball-summary", 6
-READABLE = 5, SCHEMA_VERSION
-"""Versions of summaries that can be read: 5 had `witnesses` in the place of `engines`."""
-
 
 Files = Mapping[str, Mapping[int, Sequence[str]]]
 """Files of measurements, relative to the results directory: by engine, the one on trial first, and
@@ -147,7 +144,7 @@ def load(directory: Path) -> Summary:
             f"cannot read {path}: No such file or directory; run 'dualball validate -o {directory}'"
         )
     with reading_json(path, "summary that this program reads") as content:
-        if content["schema"] != SCHEMA or content["schema_version"] not in READABLE:
+        if content["schema"] != SCHEMA or content["schema_version"] != SCHEMA_VERSION:
             raise ValueError("it is in another format; choose another directory with --output")
         Level[content["level"]]
         files = {

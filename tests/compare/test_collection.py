@@ -91,9 +91,6 @@ def test_the_law_of_drag_is_kept(tmp_path):
     about = collection.describe(collection.read(tmp_path / "all.h5"))
     assert (about["drag"], about["varied"]) == (["quadratic", "stokes"], ["nu_f", "drag"])
     assert collection.shown(about).row_count == 7
-    with reading(tmp_path / "all.h5") as file:
-        older = {name: column(dataset(file, name)) for name in file if name != "drag"}
-    assert collection.describe(older)["varied"] == ["nu_f"]
 
 
 def test_theory_stands_beside_what_was_measured(tmp_path):

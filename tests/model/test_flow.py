@@ -41,9 +41,6 @@ def test_a_mapping_holds_all_of_it(flow):
     t = np.linspace(0, 10, 101)
     np.testing.assert_array_equal(back(t), flow(t))
     assert back.kind == flow.kind
-    # without waves
-    older = Flow.from_mapping({"kind": "steady", "start": [0], "value": [1], "slope": [0]})
-    assert older.is_steady
 
 
 @pytest.mark.parametrize(

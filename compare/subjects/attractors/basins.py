@@ -79,8 +79,6 @@ class Basins:
     def load(cls, path: str | Path) -> Self:
         """Inverse of `save`; raises `StorageError` for what can't be read."""
         with reading_json(Path(path), "basins") as data:
-            if "fates" in data:  # what files of before call them
-                data["attractors"] = data.pop("fates")
             arrays: dict[str, Any] = {
                 name: np.array(data.pop(name)) for name in ("x", "y", "attractors", "mujoco")
             }
