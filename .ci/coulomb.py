@@ -76,7 +76,7 @@ def lands():
     assert max(speeds[fastest + 2 :]) <= 1e-10 * speeds[fastest]
 
 
-def is_the_same_through_all_doors(cone, rigid):
+def is_the_same_however_it_steps(cone, rigid):
     results = []
     for door in "step", "halves", "installed":
         model, data = boxes(0.5, slope=10, number=3, height=0.07, cone=cone)
@@ -102,7 +102,7 @@ if __name__ == "__main__":
         slides(rigid)
         for cone in CONES:
             holds(cone, rigid)
-            is_the_same_through_all_doors(cone, rigid)
+            is_the_same_however_it_steps(cone, rigid)
     holds_in_four_stages()
     lands()
     print(f"mujoco-coulomb, MuJoCo {mujoco.__version__}: as it should be")

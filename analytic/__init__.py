@@ -28,7 +28,7 @@ from analytic.slipping.slip_stability import SlipStability
 from analytic.stationary.solutions import (
     Stability,
     StationarySolution,
-    leaning_modes,
+    eigenmodes_SR,
     slowest_time_constant,
     solution,
     stable_solutions,
@@ -46,7 +46,7 @@ __all__ = [
     "attractors",
     "characteristic_slope",
     "contact_forces",
-    "leaning_modes",
+    "eigenmodes_SR",
     "mean_slope",
     "operating_limit",
     "operating_range",

@@ -19,7 +19,7 @@ from scipy.optimize import brentq
 
 from analytic.simulation import equations, hybrid
 from analytic.simulation.coordinates import TURNING, least_slip
-from analytic.simulation.equations import FINER, LOCAL, PATIENCE, SMALL_SLIP
+from analytic.simulation.equations import FINER, LOCAL, SMALL_SLIP, STIFF_STEPS
 from analytic.simulation.integrator import Pace, finish_straight
 from analytic.simulation.solvers import DONE, EPS, FIRED, PAUSED, STUCK, Stretch
 from model.arrays import Array
@@ -54,11 +54,14 @@ def stretch(
                     return FIRED, (t, 0.0, 0.0, small, 0), guard, taken
                 grown = least_slip(of.z, of.scale, of.k.case) > SMALL_SLIP
                 slow = 0 if grown else slow + 1
-                if slow % PATIENCE == PATIENCE - 1 and (end := finish_straight(t, of, taken)) >= 0:
+                if (
+                    slow % STIFF_STEPS == STIFF_STEPS - 1
+                    and (end := finish_straight(t, of, taken)) >= 0
+                ):
                     return DONE, pace, -1, end
                 if steps >= most and t < of.until:
                     return PAUSED, (t, 0.0, 0.0, small, 0), -1, taken
-                if grown if small else slow > PATIENCE:
+                if grown if small else slow > STIFF_STEPS:
                     break
         except ArithmeticError:
             failures += 1

@@ -9,7 +9,7 @@ import pytest
 import analytic
 import compare
 import mjsim
-from analytic import characteristic_slope, leaning_modes, mean_slope, simulate_many, solution
+from analytic import characteristic_slope, eigenmodes_SR, mean_slope, simulate_many, solution
 from analytic.bifurcation.diagram import number_of_folds
 from analytic.flowmeter import response
 from analytic.slipping import slip_bounds, slip_stability
@@ -111,8 +111,8 @@ REFUSED = [
     (lambda: solution(SLOW, Case.SS), "case SS has no stable stationary solution"),
     (lambda: solution(SLOW, Case.RR, stable=False), "case RR has no unstable stationary solution"),
     (lambda: solution(FAST, Case.NN), "case NN has no stable"),
-    (lambda: leaning_modes(LEANS.replace(omega_0=0.0)), "SR has no stationary solution that leans"),
-    (lambda: leaning_modes(LEANS.replace(mu=0.0)), "SR has no stationary solution that leans"),
+    (lambda: eigenmodes_SR(LEANS.replace(omega_0=0.0)), "SR has no stationary solution that leans"),
+    (lambda: eigenmodes_SR(LEANS.replace(mu=0.0)), "SR has no stationary solution that leans"),
     (
         lambda: characteristic_slope(FAST),
         "several branches at omega_0 = 35 rad s-1: choose SR, SS, NR",

@@ -12,7 +12,7 @@ from pathlib import Path
 LINES, PARAMETERS = 75, 6
 ROOT = Path(__file__).parents[1]
 EXCEPTIONS = {
-    # doors for users, whose options have names and defaults
+    # calls of users, whose options have names and defaults
     *("analytic/simulation/ensemble.py:simulate_many", "analytic/simulation/simulator.py:simulate"),
     *("mjsim/engine.py:__init__", "mjsim/engine.py:simulate", "mjsim/engine.py:simulate_many"),
     *("compare/validation.py:validate", "compare/view/page.py:save"),
@@ -34,7 +34,7 @@ SAME = {
     *"Scene Settings best defaults free".split(),
     # the same, with another value: degrees of polynomials, records, random numbers, units and
     # symbols of other names
-    *"DEGREES EPS FEWEST G LEAST LISTED PATIENCE PUSH REFINED RTOL SEED SET SKIPPED STARTS".split(),
+    *"DEGREES EPS FEWEST G LEAST LISTED PUSH RTOL SEED SET SKIPPED STARTS".split(),
     *"STEPS SYMBOLS T UNITS".split(),
 }
 """Names of which a package may have several."""

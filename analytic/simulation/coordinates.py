@@ -85,7 +85,7 @@ def count_guards(k: System) -> int:
 
 
 def begin(case: int, at: HybridState, k: System, z: Any, scale: Any) -> tuple[System, int]:
-    """Begin a case at a moment: write coordinates z and their natural sizes; return its constants
+    """Begin a case: write coordinates z and their natural sizes; return its constants
     and their number."""
     if case % 3 == AWAY:
         return _begin_off_wall(case, at, k, z, scale)
@@ -144,8 +144,8 @@ def _begin_off_wall(
 
 
 def hybrid_state(t: Any, z: Any, at: HybridState, k: System) -> HybridState:
-    """The state with azimuth and work at a time t, from coordinates z of a case that began at the
-    moment `at`.
+    """The state with azimuth and work at a time t, from coordinates z of a case that began at
+    `at`.
 
     An azimuth off the wall is given up to whole turns.
     """
@@ -168,7 +168,7 @@ def hybrid_state(t: Any, z: Any, at: HybridState, k: System) -> HybridState:
 
 
 def _hybrid_state_off_wall(t: Any, z: Any, at: HybridState, k: System) -> HybridState:
-    """As `moment`, for a ball away from the wall."""
+    """As `hybrid_state`, for a ball away from the wall."""
     turn, u = cmath.exp(1j * at.theta), rigid_body.velocities(at.x, k)
     place, moves, y, v_y, alpha, slide = z[0] + 1j * z[1], z[2] + 1j * z[3], 0.0, 0.0, math.nan, 0j
     rho = np.abs(place)

@@ -29,7 +29,7 @@ LOCAL = 0.25
 ONSET_SLIP, SMALL_SLIP = 1e-7, 1e-2
 """Slip that has just set in, and below which its direction may be stiff, relative to the spin of
 rolling at sqrt(g R). """
-PATIENCE = 300
+STIFF_STEPS = 300
 """Steps with a small slip after which a stiff method takes over; a slip that dies out takes
 fewer."""
 STABILITY, FEASIBILITY = range(2)

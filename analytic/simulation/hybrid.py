@@ -42,7 +42,7 @@ and as many as there are, of a run that nobody looks at."""
 
 
 class Stage(NamedTuple):
-    """How far a run has come: the moment, the case, and what is counted."""
+    """How far a run has come: the hybrid state, the case, and what is counted."""
 
     at: HybridState
     case: int = NONE
@@ -53,7 +53,7 @@ class Stage(NamedTuple):
 
 
 def _state_parts(at: HybridState) -> tuple[Any, ...]:
-    """The fields of a moment as a plain tuple."""
+    """The fields of a hybrid state as a plain tuple."""
     return at.time, at.theta, at.x[:], at.alpha, at.beta, at.work
 
 
@@ -61,7 +61,7 @@ def follow(
     case: int, at: HybridState, until: float, k: System, run: Rows, steps: int
 ) -> tuple[int, HybridState]:
     """Follow one case to the first guard, up to a time, or for so many steps: what ended it, and
-    the moment then."""
+    the hybrid state then."""
     room = np.empty((6, coordinates.MOST))
     k, n = coordinates.begin(case, at, k, room[0], room[1])
     z, scale, rate, count = room[0, :n], room[1, :n], room[2, :n], coordinates.count_guards(k)
@@ -93,8 +93,8 @@ def follow(
 
 
 def _with_nearest_azimuth(at: HybridState, k: System, near: float) -> HybridState:
-    """The same moment; of the azimuths that it may have off the wall that which is nearest to
-    another."""
+    """The same hybrid state; of the azimuths that it may have off the wall that which is nearest
+    to another."""
     if k.case % 3 != AWAY:
         return at
     theta = at.theta - 2 * math.pi * math.floor((at.theta - near) / (2 * math.pi) + 0.5)
@@ -114,7 +114,7 @@ def _keep_samples(of: Stretch, at: HybridState, taken: int, run: Rows) -> float:
 
 
 def _keep_sample(at: HybridState, k: System, run: Rows) -> None:
-    """Store a moment as the next sample, and what its forces follow from."""
+    """Store a hybrid state as the next sample, and what its forces follow from."""
     row = keep_sample(at.x, k.case, run)
     if len(run.path) > 0:
         run.path[row, :5] = at.theta, at.work, at.alpha, at.beta, equations.fluid(at.time, k)

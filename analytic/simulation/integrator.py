@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from analytic.simulation import coordinates, equations
-from analytic.simulation.equations import ONSET_SLIP, PATIENCE, SMALL_SLIP
+from analytic.simulation.equations import ONSET_SLIP, SMALL_SLIP, STIFF_STEPS
 from analytic.simulation.solvers import (
     DONE,
     OTHER,
@@ -74,7 +74,7 @@ def stretch(of: Stretch, pace: Pace, taken: int, most: int) -> tuple[int, Pace, 
     start, tau, h, small, slow = pace
     why, left = OTHER, most
     while why == OTHER or (why == PAUSED and left > 0):
-        left -= PATIENCE if small else most
+        left -= STIFF_STEPS if small else most
         end = finish_straight(start + tau, of, taken) if slow % 2 == 1 else -1
         if end >= 0:
             return DONE, (start, tau, h, small, slow), -1, end

@@ -1,4 +1,4 @@
-"""Data of simulations: the ball in its flow, a moment, and the record of a run."""
+"""Data of simulations: the ball in its flow, a hybrid state, and the record of a run."""
 
 from __future__ import annotations
 

@@ -109,7 +109,7 @@ def slip_perturbation(p: Parameters, slip: float, beta: float, t_end: float) -> 
 
 
 def unloading(p: Parameters, hold: float) -> Trajectory:
-    """omega_0 lowered in steps through omega_02 with the ball riding the wall: the black dot of
+    """omega_0 lowered in steps through omega_02 with the ball in NR: the black dot of
     Fig. 13 (eta > j).
 
     NR is left for NS, the ball falls, hits the floor, and ends in RR: the transients and impacts of

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from scipy.integrate import DOP853
 
 from analytic.simulation import coordinates, equations
-from analytic.simulation.equations import FINER, LOCAL, PATIENCE, SMALL_SLIP, System
+from analytic.simulation.equations import FINER, LOCAL, SMALL_SLIP, STIFF_STEPS, System
 from model.arrays import Array
 
 DONE, FIRED, STUCK, PAUSED, OTHER = range(5)
@@ -235,7 +235,7 @@ def explicit_steps(
 ) -> tuple[int, float, float, int, int]:
     """Up to `most` explicit steps from start + tau on: why they end, tau, h, guard, samples taken.
 
-    A slip below `SMALL_SLIP` for more than `PATIENCE` steps is for the other method. A step is
+    A slip below `SMALL_SLIP` for more than `STIFF_STEPS` steps is for the other method. A step is
     interpolated where a sample is due, or a guard not `CLEAR`."""
     k, until, z, scale, times, samples, arm, level = of
     n, span, rtol, slow, rejected = len(z), until - start, max(LOCAL * k.rtol, FINEST), 0, False
@@ -319,7 +319,7 @@ def explicit_steps(
                 z[i] += left * K[0, i]
             equations.guards(start + tau + left, z, k, values)
             return FIRED, tau + left, h, int(values.argmin()), taken
-        if slow > PATIENCE:
+        if slow > STIFF_STEPS:
             return OTHER, tau, h, -1, taken
     return PAUSED, tau, h, -1, taken
 
@@ -395,7 +395,7 @@ def _extrapolation_step(
 def implicit_steps(
     of: Stretch, start: float, tau: float, h: float, taken: int
 ) -> tuple[int, float, float, int, int]:
-    """As `explicit_steps`, by implicit ones: for `PATIENCE` steps, or until all slips are
+    """As `explicit_steps`, by implicit ones: for `STIFF_STEPS` steps, or until all slips are
     `GROWN_SLIP`.
 
     A Jacobian shifts z by a share of it, or at least of its natural size, or of the tolerance times
@@ -404,7 +404,7 @@ def implicit_steps(
     n, span, (first, end) = len(z), until - start, coordinates.TURNING[k.case]
     table, J, here, rate = np.empty((COLUMNS, n)), np.empty((n, n)), np.empty(n), np.empty(n)
     now, values = np.empty(n), np.empty(len(arm))
-    for _ in range(PATIENCE):
+    for _ in range(STIFF_STEPS):
         if tau >= span:
             return DONE, tau, h, -1, taken
         equations.rates(start + tau, z, k, here)

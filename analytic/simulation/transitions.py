@@ -54,8 +54,8 @@ UNSETTLED = "the contact problem doesn't settle"
 
 
 def react(guard: int, case: int, at: HybridState, k: System) -> tuple[int, HybridState, Forces]:
-    """What follows when a guard has fired: the next case, the moment at its start, and impulses of
-    an impact."""
+    """What follows when a guard has fired: the next case, the hybrid state at its start, and
+    impulses of an impact."""
     x, A, B = at.x, case // 3, case % 3
     still = 10 * k.rtol * k.spin  # slip that counts as zero where the other contact has just stuck
     if guard in (A_SLIPS, B_SLIPS):
@@ -102,12 +102,12 @@ def settle(at: HybridState, k: System) -> tuple[int, HybridState, Forces]:
 
 
 def with_directions(at: HybridState, x: State, alpha: float, beta: float) -> HybridState:
-    """The moment with another state and directions of slip."""
+    """The hybrid state with another state and directions of slip."""
     return HybridState(at.time, at.theta, x, alpha, beta, at.work)
 
 
 def choose(at: HybridState, k: System) -> tuple[int, HybridState]:
-    """The case in which a ball goes on, and the moment with the directions of slip filled in.
+    """The case in which a ball goes on, and the hybrid state with the directions of slip.
 
     Contacts are closed where gap and normal speed are exactly zero, and still where the slip is.
     """
@@ -127,7 +127,7 @@ def choose(at: HybridState, k: System) -> tuple[int, HybridState]:
 
 
 def leave(at: HybridState, k: System) -> tuple[int, HybridState]:
-    """The case that follows RR where slip or lift lasts, and the moment with its slip directions.
+    """The case that follows RR where slip or lift lasts, and the hybrid state with its directions.
 
     Friction is full where slip sets in and opposes it: forces and rates pass continuously from
     rolling to slipping. Beyond the onset the contact problem may have a solution that rolls, too:
@@ -197,8 +197,8 @@ def _contact_after(
 
 
 def collide(at: HybridState, k: System) -> tuple[HybridState, Forces]:
-    """The moment after an impact, and its impulses: all contacts that touch at once, by Newton's
-    restitution.
+    """The hybrid state after an impact, and its impulses: all contacts that touch at once, by
+    Newton's restitution.
 
     Friction opposes the slip that is left. A single contact of a sphere obeys p_n = (1+e) m |v_n|
     and p_t = min(friction p_n, m_t |slip|) against the slip; two contacts are solved together,

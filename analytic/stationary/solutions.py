@@ -282,26 +282,26 @@ def _wall_carries(p: Parameters) -> bool:
     return p.eta * p.Omega_0**2 >= 1
 
 
-def leaning_modes(p: Parameters) -> tuple[npt.NDArray[np.complex128], npt.NDArray[np.complex128]]:
+def eigenmodes_SR(p: Parameters) -> tuple[npt.NDArray[np.complex128], npt.NDArray[np.complex128]]:
     """Eigenvalues (2,) in rad s-1 of f_SR at its stationary solution, and unit vectors (2, 2), one
     a row.
 
     There A_y = 0, the border to NR (Proposition 3): the eigenvalues show on the side A_y > 0 only,
-    where the ball leans on the floor; on the other it lifts off. The first is that of leaning,
-    which decays for omega_0 > omega_03 and grows below; the second that of the orbit, the one
+    where the ball leans on the floor; on the other it lifts off. The first mode is that of the
+    load, which decays for omega_0 > omega_03 and grows below; the second that of the orbit, the one
     closer to -c/(1+j). Vectors are over (omega_c, slip_x) and lead to A_y > 0. With s the sign of
     slip_x the sum of the two is -(c + mu s (g/(R omega_0) - (1+j) omega_0))/(1+j), their product
     -mu s c omega_0/(1+j), where c is that of a vanishing lag.
 
     Raises `InputError` if SR has no stationary solution that leans: for mu = 0, omega_0 = 0, and at
     omega_03, where slip_x = 0."""
-    leaning = [s.state for s in stationary_solutions(p, (Case.SR,)) if p.mu > 0]
-    if not leaning:
+    states = [s.state for s in stationary_solutions(p, (Case.SR,)) if p.mu > 0]
+    if not states:
         raise InputError(
             f"omega_0 = {p.omega_0:g} rad s-1, mu = {p.mu:g}: SR has no stationary solution that "
             f"leans on the floor"
         )
-    (x,) = leaning
+    (x,) = states
     values, vectors = np.linalg.eig(dynamics.jacobian(Case.SR, x, p).astype(complex))
     first = int(np.argmax(np.abs(values + drag.coefficient(0.0, p) / (1 + p.j))))
     order = [first, 1 - first]

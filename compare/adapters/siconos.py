@@ -29,7 +29,7 @@ from model import InputError
 from model.versions import ABSENT
 
 PROGRAM = Path(__file__).with_name("_siconos_worker.py")
-PATIENCE = 60.0
+TIMEOUT = 60.0
 """For how long, s, an answer is waited for."""
 SETTINGS = {"theta": 0.5, "activation": 1e-9, "projection": 1e-12}
 SETTINGS |= {"newton": 1e-15, "tolerance": 1e-14}
@@ -71,7 +71,7 @@ def locate(named: str | None) -> tuple[str, str]:
         command = [python or "", "-I", "-c", "import siconos; print(siconos.version)"]
         try:
             version = subprocess.run(
-                command, capture_output=True, text=True, timeout=PATIENCE, check=True
+                command, capture_output=True, text=True, timeout=TIMEOUT, check=True
             ).stdout
         except (OSError, subprocess.SubprocessError):
             continue
@@ -131,8 +131,8 @@ class Siconos(Free):
         assert answers
         with contextlib.suppress(OSError):  # it has ended, which the answer will show
             print(json.dumps(what), file=sent, flush=True)
-        if not select.select([answers], [], [], PATIENCE)[0]:
-            raise BreakdownError(f"gave no answer for {PATIENCE:g} s")
+        if not select.select([answers], [], [], TIMEOUT)[0]:
+            raise BreakdownError(f"gave no answer for {TIMEOUT:g} s")
         line = answers.readline()
         if not line:
             assert self._process.stderr

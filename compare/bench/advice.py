@@ -92,7 +92,7 @@ def remedied(model: Any, data: Any) -> tuple[Any, Any, Callable[[Any, Any, int],
 
 
 def apply(model: Any, option: str, value: Sequence[float]) -> None:
-    """Set one option of a model; softness only of what is softer than the value."""
+    """Set one option of a model; solref and solimp only of what is softer than the value."""
     if option in ("impratio", "cone", "timestep"):
         setattr(model.opt, option, value[0])
     kinds = ("geom", "pair") if option in ("solref", "solimp") else ()
@@ -174,7 +174,7 @@ def best_change(
 
 
 def _changed_by_name(model: Any, changed: Any, option: str) -> Iterator[str]:
-    """Geoms that name an option of softness themselves, or by their class, and have it changed."""
+    """Geoms that name solref or solimp themselves, or by their class, and have it changed."""
     if option in UNNAMED:
         now, then = (getattr(each, f"geom_{option}") for each in (model, changed))
         named = (now[:, :2] != UNNAMED[option]).any(1) & (now != then).any(1)

@@ -14,7 +14,7 @@ from typing import NoReturn
 from compare.stops import SIGNALS
 from model.files import leave
 
-_PATIENCE = 2.0
+_SEND_AGAIN = 2.0
 """Of what is to stop by itself, s."""
 _WAITS = 200
 """How often a signal waits for an import, .01 s at a time: one may never end."""
@@ -68,7 +68,7 @@ def noted() -> Iterator[list[int]]:
 
     def note(number: int, frame: FrameType | None) -> None:
         heard.append(number)
-        sent.append(_send_later(number, _PATIENCE))
+        sent.append(_send_later(number, _SEND_AGAIN))
 
     with on_first_signal(note):
         try:

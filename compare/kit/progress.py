@@ -26,7 +26,7 @@ READY = "getting ready"
 """What is said before anything else is."""
 DRAWING = 0.1
 """Share of a validation's time that drawing its figures takes, about."""
-PATIENCE = 60.0
+BY_THE_TABLE = 60.0
 """Processor time, s, of which a validation's pace is taken to be that of the table of costs."""
 LATE = 0.1
 """Share of its cost that a protocol still takes, at least, however long it has taken."""
@@ -216,7 +216,7 @@ class ValidationProgress:
             if name in self._measured or self._spent[name] > self.costs[name]
         ]  # fmt: skip
         spent, cost = (sum(of[name] for name in done) for of in (self._spent, self.costs))
-        pace = (spent + PATIENCE) / (cost + PATIENCE)
+        pace = (spent + BY_THE_TABLE) / (cost + BY_THE_TABLE)
         rest = sum(
             max(pace * cost - self._spent[name], LATE * pace * cost)
             for name, cost in self.costs.items()

@@ -38,7 +38,7 @@ Spread = Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[Any]]
 JUDGING = 30.0
 """Processor time that judging a claim or drawing a figure may take, s: thirty times what the
 longest takes at the quick level. What files say may be nonsense that takes years."""
-PATIENCE = 10.0
+SCHEDULER_TIMEOUT = 10.0
 """How long a scheduler has to answer, s."""
 ASLEEP = 1.0
 """How long a thread that waits sleeps at a stretch, s."""
@@ -223,7 +223,7 @@ def dask(address: str) -> Workers:
     for name in ("distributed", "distributed.client", "tornado.application", "asyncio"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
-        client: Any = Client(address, timeout=PATIENCE)  # type: ignore[no-untyped-call]
+        client: Any = Client(address, timeout=SCHEDULER_TIMEOUT)  # type: ignore[no-untyped-call]
     except (OSError, ValueError, TypeError) as error:
         raise InputError(f"no Dask scheduler answers at {address}: {error}") from error
     count = sum(client.nthreads().values())

@@ -44,7 +44,7 @@ from model.parameters import REACH, parse_number
 HOST = "127.0.0.1"
 LASTS, RATE = 10.0, 60
 """Duration of a motion, s, and its samples a second."""
-REST, PATIENCE = 0.3, 3600.0
+REST, RECONNECT = 0.3, 3600.0
 """How long nothing is moved before the motion is simulated anew, s, and a tab is kept that doesn't
 answer: a browser that is busy for seconds, as with 3-D without a graphics card, would begin with
 the first set again."""
@@ -305,7 +305,7 @@ def serve(p: Parameters, port: int, show: bool) -> None:
     quiet: dict[str, Any] = {
         "reload": False,
         "show_welcome_message": False,
-        "reconnect_timeout": PATIENCE,
+        "reconnect_timeout": RECONNECT,
         "http": guard.Prompt,
     }
     ui.run(partial(page, p), host=HOST, port=port, title="dualball", show=show, **quiet)

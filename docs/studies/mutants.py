@@ -11,7 +11,7 @@ from pathlib import Path
 from compare.kit import pages
 from model.files import write_text
 from tests.mutants.theories import FOR_TESTS, THEORIES
-from tests.mutants.trial import KINDS, PATIENCE, SLOWER, Judged, Trial, name_of
+from tests.mutants.trial import KINDS, LONGEST, SLOWER, Judged, Trial, name_of
 
 BY_HAND = {
     "SS whose wall never opens": "analytic/test_hybrid::test_a_case_ends_where_its_forces_do",
@@ -66,7 +66,7 @@ def page(tried: Mapping[str, Sequence[Trial]], engines: Sequence[Trial] = ()) ->
 Every verdict must be able to be lost: theory is replaced by slightly wrong ones, one at a time, and
 MuJoCo by slightly wrong engines, which measure anew. A fault is noticed if the verdict on a claim
 changes; a prediction that takes {SLOWER:g} times as long as by the right theory, at most
-{PATIENCE:g} s, is given up. Lists that others wrote say more than ours, which was written beside
+{LONGEST:g} s, is given up. Lists that others wrote say more than ours, which was written beside
 the claims: each was judged once, at quick, before anything was changed for it. Who notices which
 fault, and the unit test that sees what no measurement can show, is in [mutants.csv](mutants.csv).
 `make mutants` writes all of it in two hours;

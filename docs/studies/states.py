@@ -77,8 +77,8 @@ class Stationary:
 ROLLING = Stationary(SMOOTH.replace(omega_0=12.0), Case.RR)
 BARELY = Stationary(SMOOTH.replace(omega_0=14.5), Case.SS)
 SLIPPING = Stationary(SMOOTH.replace(omega_0=25.0), Case.SS)
-RIDING = Stationary(ROUGH.replace(omega_0=25.0), Case.NR)
-STATES = (ROLLING, BARELY, SLIPPING, RIDING)
+ON_THE_WALL = Stationary(ROUGH.replace(omega_0=25.0), Case.NR)
+STATES = (ROLLING, BARELY, SLIPPING, ON_THE_WALL)
 """Rolling, slipping little and much, and carried by the wall alone."""
 
 

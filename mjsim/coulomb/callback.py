@@ -1,8 +1,8 @@
 """How the law reaches a simulation: MuJoCo's control callback, which every step has.
 
 The law stands between MuJoCo's velocities and its solver, where `mj_step` calls `mjcb_control`. All
-doors set it and call MuJoCo's own functions, so that errors and callbacks in Python end as they
-always do. A callback that was there before is called first.
+ways to step set it and call MuJoCo's own functions, so that errors and callbacks in Python end as
+they always do. A callback that was there before is called first.
 """
 
 from __future__ import annotations

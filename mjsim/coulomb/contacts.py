@@ -193,7 +193,7 @@ def clear(contact: Any) -> None:
     """Make it a new contact, of which nothing is known."""
     contact.state, contact.lift, contact.load = NEW, 0.0, 0.0
     contact.predicted, contact.found, contact.extrapolated = 0.0, 0.0, 0.0
-    contact.missed, contact.bias, contact.error, contact.weakened = 0.0, 0.0, 0.0, 0
+    contact.shortfall, contact.bias, contact.error, contact.weakened = 0.0, 0.0, 0.0, 0
     for axis in range(3):
         contact.velocity[axis] = contact.turned[axis] = 0.0
         for kind in range(2):
@@ -359,7 +359,7 @@ def inherit(model: Any, data: Any, memory: Any, contact: Any, old: Any) -> None:
     """
     alone, spins = contact.state == NEW, (spin(model, data, old, 0), spin(model, data, old, 1))
     both = spins[0] + spins[1]
-    contact.bias, contact.missed = (old.bias, old.missed) if alone else (0.0, 0.0)
+    contact.bias, contact.shortfall = (old.bias, old.shortfall) if alone else (0.0, 0.0)
     known = alone and (
         is_fixed(model, memory, old, max(spins)) or rolls(model, memory, contact, old)
     )

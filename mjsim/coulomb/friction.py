@@ -127,13 +127,13 @@ def learn(memory: Any, contact: Any) -> None:
     """Learn from the slip of a rigid contact how wrong its prediction was, or would have been in a
     step that was solved; from a jump, which is in one step alone, nothing."""
     if not memory.law.rigid or contact.state != SLIDES or contact.extrapolated < 0:
-        contact.bias, contact.missed = 0.0, 0.0
+        contact.bias, contact.shortfall = 0.0, 0.0
         return
     predicted = max(contact.extrapolated + contact.bias, 0.0)
     contact.error = max(contact.error, abs(contact.found - predicted))
-    before, contact.missed = contact.missed, contact.found - contact.extrapolated
-    most = min(abs(before), abs(contact.missed)) if before * contact.missed > 0 else 0.0
-    contact.bias = min(max((contact.bias + contact.missed) / 2, -most), most)
+    before, contact.shortfall = contact.shortfall, contact.found - contact.extrapolated
+    most = min(abs(before), abs(contact.shortfall)) if before * contact.shortfall > 0 else 0.0
+    contact.bias = min(max((contact.bias + contact.shortfall) / 2, -most), most)
 
 
 @kernel

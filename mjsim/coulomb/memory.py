@@ -49,7 +49,7 @@ CONTACT = np.dtype(
         ("predicted", _f8),
         ("found", _f8),
         ("extrapolated", _f8),  # as if accelerations stayed those of the last step; -1: not known
-        ("missed", _f8),  # by how much that was too little in the last step
+        ("shortfall", _f8),  # by how much that was too little in the last step
         ("bias", _f8),  # what to add to it: half of that and half of what was added, at most that
         ("error", _f8),  # by how much the prediction was wrong
         # -- of one step alone --

@@ -363,7 +363,7 @@ def test_a_scheduler_that_dies_is_said_and_what_is_whole_stays(
 
 def test_a_scheduler_that_does_not_answer(monkeypatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("compare.kit.workers.PATIENCE", 0.5)
+    monkeypatch.setattr("compare.kit.workers.SCHEDULER_TIMEOUT", 0.5)
     with pytest.raises(InputError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:1"):
         dask("tcp://127.0.0.1:1")
 

@@ -311,7 +311,7 @@ def test_a_process_that_fails_is_the_run_s_failure(program, says, tmp_path, monk
         f"flush=True)\ninput()\n{program}\n"
     )
     monkeypatch.setattr(siconos, "PROGRAM", script)
-    monkeypatch.setattr(siconos, "PATIENCE", 2)  # a loaded machine takes half a second to begin
+    monkeypatch.setattr(siconos, "TIMEOUT", 2)  # a loaded machine takes half a second to begin
     monkeypatch.setattr(siconos, "locate", lambda named: (sys.executable, "4.4.0"))
     monkeypatch.setattr(
         siconos.subprocess, "Popen", lambda *a, **b: started.append(popen(*a, **b)) or started[-1]

@@ -120,12 +120,12 @@ def test_a_run_that_breaks_down_is_said_and_takes_no_other_with_it(runner, name,
         (
             flowmeter.hysteresis,
             THICK,
-            "no flow at which slipping on the floor gives way to riding the wall",
+            "no flow at which SS gives way to NR",
         ),
     ],
 )
 def test_what_is_not_there_is_said(runner, measure, p, said):
-    """Without friction, slip, settled states, or a change from slipping to riding."""
+    """Without friction, slip, settled states, or a change from SS to NR."""
     rows = list(measure(runner, {"mine": p}, Records()))
     assert {(type(row), row.set) for row in rows} == {(Missing, "mine")}
     assert any(said in row.reason for row in rows)

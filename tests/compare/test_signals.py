@@ -57,7 +57,7 @@ def catches(process, number):
 def heard(request, monkeypatch):
     """A signal, also where a shell runs the tests in the background, and has SIGINT ignored; what
     it waits for it waits for half as long as usual."""
-    monkeypatch.setattr(signals, "_PATIENCE", signals._PATIENCE / 2)
+    monkeypatch.setattr(signals, "_SEND_AGAIN", signals._SEND_AGAIN / 2)
     monkeypatch.setattr(signals, "_WAITS", signals._WAITS // 2)
     before = signal.signal(request.param, signal.SIG_DFL)
     yield request.param

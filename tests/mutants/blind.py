@@ -44,7 +44,7 @@ from model.versions import current_commit
 from tests.mutants import formulas
 from tests.mutants.engines import wrong_engine
 from tests.mutants.exchange import WrongTheory, believed
-from tests.mutants.trial import PATIENCE, PROVING
+from tests.mutants.trial import LONGEST, PROVING
 
 PAGE, KEY = Path("docs/blind.md"), "key.json"
 ASKED = ("drake", "siconos")
@@ -167,7 +167,7 @@ def tried(wrong: WrongTheory, said: Sequence[Said], records: RecordsByEngine) ->
             if each.engines.keys() <= detection.by.keys():
                 continue
             try:
-                with at_most(PATIENCE):
+                with at_most(LONGEST):
                     detection.add(each, full_verdict(each.verdict.claim, records))
             except LateError:
                 detection.broke = detection.changes = True

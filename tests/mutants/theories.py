@@ -284,17 +284,21 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     },
     "stationary.slipping_branch.eigenvalues_at": {"eigenvalues of SS 3 % large": scaled(1.03)},
     "mechanics.dynamics.eigenvalues": {"eigenvalues of RR, RS, NR, NS 3 % large": scaled(1.03)},
-    "stationary.solutions.leaning_modes": {
-        "leaning rate of SR 5 % large": scaled(1.05, 0),
-        "leaning and the orbit exchange their rates": answer(
+    "stationary.solutions.eigenmodes_SR": {
+        "growth rate of SR 5 % large": scaled(1.05, 0),
+        "the eigenmodes of SR exchange their rates": answer(
             lambda modes: (modes[0][::-1], modes[1])
         ),
-        "leaning and the orbit exchange their directions": answer(
+        "the eigenmodes of SR exchange their directions": answer(
             lambda modes: (modes[0], modes[1][::-1])
         ),
-        "leaning modes in the other order": answer(lambda modes: (modes[0][::-1], modes[1][::-1])),
-        "leaning mirrored": answer(lambda modes: (modes[0], modes[1] * [1, -1])),
-        "leaning at half the slope": answer(lambda modes: (modes[0], modes[1] * [1, 0.5])),
+        "eigenmodes of SR in the other order": answer(
+            lambda modes: (modes[0][::-1], modes[1][::-1])
+        ),
+        "first eigenmode of SR mirrored": answer(lambda modes: (modes[0], modes[1] * [1, -1])),
+        "first eigenmode of SR at half the slope": answer(
+            lambda modes: (modes[0], modes[1] * [1, 0.5])
+        ),
     },
     "mechanics.dynamics.jacobian": {
         "Jacobians transposed": answer(lambda matrix: np.swapaxes(matrix, -1, -2))

@@ -31,7 +31,7 @@ Outcomes = dict[str, Outcome]
 PROVING = frozenset({"settled", "laws", "field", "impacts"})
 """Protocols that are carried out with wrong engines: what an engine does at rest, in motion, in
 contact and landing."""
-PATIENCE, SLOWER = 20.0, 15.0
+LONGEST, SLOWER = 20.0, 15.0
 """Processor time that the predictions of a claim may take under a wrong theory, s, and how many
 times as long as under the right one, beside 2 s."""
 KINDS = "by_numbers", "by_error", "by_hanging", "missed"
@@ -46,7 +46,7 @@ class Trial:
     noticed: Outcomes
     """Claims whose verdict is another than without the fault, and what it is."""
     hung: tuple[str, ...] = ()
-    """Claims whose predictions were given up after `PATIENCE`: they neither notice the fault nor
+    """Claims whose predictions were given up after `LONGEST`: they neither notice the fault nor
     miss it."""
     tried: bool = True
     """Whether anything is measured that could notice it."""
@@ -163,7 +163,7 @@ def _theory(directory: Path, by: str, whole: bool, right: Sequence[Right], numbe
     with believed(wrong):
         for claim, known in asked if whole else sorted(asked, key=lambda pair: pair[1].took):
             try:
-                with at_most(min(PATIENCE, 2.0 + SLOWER * known.took)):
+                with at_most(min(LONGEST, 2.0 + SLOWER * known.took)):
                     outcome = _outcome(directory, by, claim)
                 noticed |= {claim.id: outcome} if outcome is not known.outcome else {}
             except LateError:  # as when a wrong theory never comes to the end of a motion

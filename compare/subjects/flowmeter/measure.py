@@ -157,7 +157,7 @@ def hysteresis(runner: Runner, sets: Sets, records: Records) -> Measured:
             starts = ((p.replace(omega_0=flow), side) for side, flow in sides)
             loops[name] = [Start(name, q, side, np.zeros(8)) for q, side in starts]
         else:
-            why = "no flow at which slipping on the floor gives way to riding the wall"
+            why = "no flow at which SS gives way to NR"
             yield runner.missing(name, why)
     tasks = [_loop_task(runner, loop) for loop in loops.values()]
     for (name, loop), task, run in zip(loops.items(), tasks, runner.each(tasks), strict=True):

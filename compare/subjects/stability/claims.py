@@ -20,7 +20,7 @@ from model.cases import TRAITS
 from model.kinematics import VARIABLES, state_units
 
 _JACOBIAN = "analytic.stationary_solutions: eigenvalues of the exact Jacobian"
-_LEANING, _LINEAR = "analytic.leaning_modes", "exponential of the exact Jacobian"
+_MODES_SR, _LINEAR = "analytic.eigenmodes_SR", "exponential of the exact Jacobian"
 
 
 def _stationary(m: Measurement) -> StationarySolution:
@@ -60,12 +60,12 @@ def _mode_size(m: Measurement) -> float:
 
 
 def _response(m: Measurement) -> float:
-    """How a linear motion follows a push, in natural units; of SR by its leaning modes."""
+    """How a linear motion follows a push, in natural units; of SR by its eigenmodes."""
     p, case, time = m.parameters, (stationary := _stationary(m)).case, m.at["time"]
     names = TRAITS[case].active
     i, j = names.index(m.at["of"]), names.index(m.at["pushed"])
     if case is Case.SR:
-        values, rows = theory(analytic.leaning_modes, p)
+        values, rows = theory(analytic.eigenmodes_SR, p)
         moved = (rows.T * np.exp(values * time)) @ np.linalg.inv(rows.T)
     else:
         moved = theory(_propagator, case, tuple(stationary.x), p, time)
@@ -86,7 +86,7 @@ def _criteria(case: Case) -> tuple[Criterion, ...]:
     return (
         rates("decay_rate", lambda m: -_mode(m).real, size=_mode_size, by=_JACOBIAN),
         rates("frequency", lambda m: _mode(m).imag, size=_mode_size, by=_JACOBIAN),
-        rates("response", _response, by=_LEANING if case is Case.SR else _LINEAR),
+        rates("response", _response, by=_MODES_SR if case is Case.SR else _LINEAR),
         rates("slowest_decay", _slowest, by="analytic.slowest_time_constant"),
     )
 
@@ -100,8 +100,8 @@ _FIRST_OF_SR = given(case="SR", mode=1)
 
 
 def _leans(m: Measurement) -> float:
-    """The slowest decay of SR: that of leaning below omega_03, where it grows."""
-    decay = -theory(analytic.leaning_modes, m.parameters)[0].real
+    """The slowest decay of SR: its first eigenmode below omega_03, where it grows."""
+    decay = -theory(analytic.eigenmodes_SR, m.parameters)[0].real
     return float(decay[0] if m.parameters.omega_0 < thresholds_of(m).omega_03 else min(decay))
 
 
@@ -125,7 +125,7 @@ CLAIMS = (
         "In SR a load on the floor dies out above ω₀₃ = √(g/jR) and grows "
         "below, at the rates of the eigenvalues of f_SR.",
         *_criteria(Case.SR),
-        Criterion("rates", "decay_rate", _leans, when=_FIRST_OF_SR, size=_mode_size, by=_LEANING),
+        Criterion("rates", "decay_rate", _leans, when=_FIRST_OF_SR, size=_mode_size, by=_MODES_SR),
         text=Text.CORRECTED,
         reason="With A_y = 0 the state is on the border to NR. The eigenvalues show on the side "
         "where the ball leans on the floor. On the other it lifts off, and its height is then "

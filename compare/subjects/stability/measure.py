@@ -95,8 +95,8 @@ def measure(runner: Runner, sets: Sets, records: Records) -> Measured:
             push_response(state, size, runs[k * count : (k + 1) * count])
             for k, size in enumerate(state.sizes)
         ]
-        # An almost unloaded floor follows its load less exactly. (48 was 32 before rates of leaning
-        # by shorter records had been seen to be off.)
+        # An almost unloaded floor follows its load less exactly. (48 was 32 before rates by
+        # shorter records had been seen to be off.)
         if min(map(len, answers)) < (48 if state.case is Case.SR else 8):
             yield state.missing("pushed, the ball doesn't stay in this case")
             continue
@@ -162,8 +162,8 @@ class Pushed:
     def steps(self) -> tuple[float, float]:
         """The longer and the shorter time step, s."""
         sampling, step = self.runner.sampling, coarse_step(self.start.p)
-        leans = self.case is Case.SR
-        coarse, fine = sampling.rates_SR if leans else sampling.rates_divisors
+        of_SR = self.case is Case.SR
+        coarse, fine = sampling.rates_SR if of_SR else sampling.rates_divisors
         return step / coarse, step / fine
 
     @property

@@ -139,7 +139,7 @@ def _decay_leaning(m: Measurement) -> float:
     """The slowest decay of a ball that leans on the floor, s-1; LookupError without SR."""
     if Exists.SR not in _region(m):
         raise LookupError("the region lacks SR")
-    decays = -theory(analytic.leaning_modes, m.parameters)[0].real
+    decays = -theory(analytic.eigenmodes_SR, m.parameters)[0].real
     return float(decays[decays > 0].min())
 
 
