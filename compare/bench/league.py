@@ -7,7 +7,7 @@ import math
 import statistics
 import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -24,22 +24,45 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _OWN = "compare.adapters"
-ENTRIES: dict[str, str] = {
-    "mujoco": f"{_OWN}.mujoco_free:best",
-    "mujoco-plain": "compare.bench.joints:on_joints",
-    "mujoco-defaults": f"{_OWN}.mujoco_free:defaults",
-    "siconos": f"{_OWN}.siconos:best",
-    **{
-        f"{name.replace('_', '-')}{suffix}": f"{_OWN}.{name}:{which}"
-        for name in (*STUDIED, "mujoco_warp")
-        for suffix, which in (("", "best"), ("-defaults", "defaults"))
-    },
-    **{
-        f"newton-{name.replace('_', '-')}": f"{_OWN}.newton:{name}"
-        for name in ("kamino", "xpbd", "xpbd_defaults", "semiimplicit_defaults", "vbd_defaults")
-    },
+
+
+class LeagueEntry(NamedTuple):
+    """An engine in one kind of settings: the best that are known, or as it comes."""
+
+    engine: str
+    where: str
+    """As Python imports it, package.module:member."""
+    as_it_comes: bool = False
+
+    @property
+    def name(self) -> str:
+        """As users call it."""
+        return f"{self.engine}-defaults" if self.as_it_comes else self.engine
+
+
+def _in_both_settings(engine: str) -> tuple[LeagueEntry, LeagueEntry]:
+    """Of an adapter that has `best` and `defaults`, whose module is named as the engine."""
+    where = f"{_OWN}.{engine.replace('-', '_')}"
+    return LeagueEntry(engine, f"{where}:best"), LeagueEntry(engine, f"{where}:defaults", True)
+
+
+ENTRIES = {
+    entry.name: entry
+    for entry in (
+        LeagueEntry("mujoco", f"{_OWN}.mujoco_free:best"),
+        LeagueEntry("mujoco-plain", "compare.bench.joints:on_joints"),
+        LeagueEntry("mujoco", f"{_OWN}.mujoco_free:defaults", True),
+        LeagueEntry("siconos", f"{_OWN}.siconos:best"),
+        *itertools.chain.from_iterable(map(_in_both_settings, (*STUDIED, "mujoco-warp"))),
+        LeagueEntry("newton-kamino", f"{_OWN}.newton:kamino"),
+        LeagueEntry("newton-xpbd", f"{_OWN}.newton:xpbd"),
+        *(
+            LeagueEntry(f"newton-{name}", f"{_OWN}.newton:{name}_defaults", True)
+            for name in ("xpbd", "semiimplicit", "vbd")
+        ),
+    )
 }
-"""Where each engine is; NAME is in its best known settings, NAME-defaults as it comes."""
+"""By their names."""
 _UNDER_THE_LAW = (
     "mujoco is MuJoCo with free bodies under Coulomb's law, as mujoco-free of other commands; "
     "MuJoCo's own contacts are those of mujoco-plain and mujoco-defaults."
@@ -51,6 +74,11 @@ LEAST = 1e-8
 """Smaller errors are drawn here."""
 ENTRY_MARKS = "osv^DPX*<>phd"
 ENTRY_COLOURS = "#0072B2 #D55E00 #009E73 #CC79A7 #E69F00 #56B4E9 #000000 #8C564B".split()
+
+
+def entry(name: str) -> LeagueEntry:
+    """The entry of a name; any other is where an engine of the user's own is."""
+    return ENTRIES.get(name) or LeagueEntry(name, name)
 
 
 def measure(
@@ -131,7 +159,7 @@ def ranked(league: Mapping[str, Sequence[Result]]) -> dict[str, Sequence[Result]
 
     def place(name: str) -> tuple[bool, float]:
         passed = statistics.mean(r.passed for r in league[name] if not r.skipped)
-        return name.endswith("-defaults"), -passed
+        return entry(name).as_it_comes, -passed
 
     tried = [name for name, results in league.items() if any(not r.skipped for r in results)]
     return {name: league[name] for name in sorted(tried, key=place)}
@@ -169,16 +197,15 @@ def declarations(league: Mapping[str, Sequence[Result]]) -> Rows:
     return table
 
 
-def notes(league: Mapping[str, Sequence[Result]]) -> Iterator[tuple[str, str]]:
-    """Engines and cases that failed or were not tried, and why; one line a reason."""
+def notes(league: Mapping[str, Sequence[Result]]) -> Iterator[tuple[str, list[str], str]]:
+    """Engines, their cases that failed or were not tried, none for all, and why; one a reason."""
     for name, results in league.items():
         reasons: dict[str, list[str]] = {}
         for result in results:
             if reason := result.failure or result.skipped:
                 reasons.setdefault(reason, []).append(result.case)
         for reason, those in reasons.items():
-            which = "all cases" if len(those) == len(results) else ", ".join(those)
-            yield f"{name}, {which}", reason
+            yield name, [] if len(those) == len(results) else those, reason
 
 
 def to_mapping(league: Mapping[str, Sequence[Result]]) -> dict[str, Any]:
@@ -207,7 +234,7 @@ def draw(league: Mapping[str, Sequence[Result]]) -> Figure:
         for name, results in ranked(league).items()
     }
     shown = {name: results for name, results in finite.items() if results}
-    families = list(dict.fromkeys(name.removesuffix("-defaults") for name in shown))
+    engines = list(dict.fromkeys(entry(name).engine for name in shown))
     figure, panels = style.panels(9.0, 4.4 + 0.19 * len(shown), 2, 2, sharex=True, sharey=True)
     for axes, each in zip(panels.ravel(), KINDS, strict=True):
         for name, results in shown.items():
@@ -217,10 +244,10 @@ def draw(league: Mapping[str, Sequence[Result]]) -> Figure:
             known = np.isfinite(own[:, 1]).mean(0) > 0.5  # where the median is
             finite_ones = np.where(np.isfinite(own[:, 1:]), own, np.nan)[..., known]
             cost, error = np.nanmedian(finite_ones, axis=0)
-            number = families.index(name.removesuffix("-defaults"))
+            number = engines.index(entry(name).engine)
             mark, colour = (of[number % len(of)] for of in (ENTRY_MARKS, ENTRY_COLOURS))
             look = {"marker": mark, "color": colour, "ms": 5.5, "lw": 1}
-            look |= {"mfc": "white", "ls": ":"} if name.endswith("-defaults") else {}
+            look |= {"mfc": "white", "ls": ":"} if entry(name).as_it_comes else {}
             axes.plot(cost, np.maximum(error, LEAST), label=name, **look)
         axes.axhline(TOLERANCE, color="0.5", lw=0.8)
         axes.set(xscale="log", yscale="log", title=each)

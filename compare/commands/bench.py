@@ -34,7 +34,7 @@ def run_league(args: argparse.Namespace) -> int:
     from compare.kit import progress
     from compare.kit.pictures import embedded, svg
 
-    chosen = {name: league.ENTRIES.get(name, name) for name in args.engine or league.ENTRIES}
+    chosen = {name: league.entry(name).where for name in args.engine or league.ENTRIES}
     modules = {
         name for name in chosen if re.search(r"\w[.:]\w", name) or Path(f"{name}.py").exists()
     }
@@ -68,11 +68,9 @@ def run_league(args: argparse.Namespace) -> int:
     pictures, shown["letters"] = embedded({"": svg(league.draw(found))})
     shown["picture"] = pictures[""]
     write_text(args.output / LEAGUE_PAGE, pages.render("compare.bench", "league.html", **shown))
-    for what, why in league.notes(found):
-        if what.endswith("all cases"):
-            print(
-                f"dualball: {what.removesuffix(', all cases')} is left out: {why}", file=sys.stderr
-            )
+    for name, those, why in league.notes(found):
+        if not those:
+            print(f"dualball: {name} is left out: {why}", file=sys.stderr)
     head = [name.replace("-", "- ") for name in rows[0]]  # which may be broken there
     tables = {"League": summary, "Errors by case": [head, *rows[1:]]}
     drawn = (pages.table(title, own, no_wrap=True, padding=0) for title, own in tables.items())
