@@ -6,6 +6,7 @@ Of curves: values, slopes, zeros and maxima of polynomials, and exponents of lin
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from statistics import NormalDist
@@ -38,6 +39,22 @@ class Estimate:
         known = self.budget or ({"measured": self.uncertainty} if self.uncertainty else {})
         uncertainty = math.hypot(self.uncertainty, *causes.values())
         return replace(self, uncertainty=uncertainty, budget=dict(known) | causes)
+
+    def told_apart(
+        self, cause: str, errors: Sequence[Estimate], carried: Sequence[float] | Array
+    ) -> Self:
+        """The same, where one cause is the errors of others, by the causes of these; each comes to
+        so much, `carried` (n,)."""
+        budget, parts = dict(self.budget), defaultdict[str, float](float)
+        for each, u in zip(errors, carried, strict=True):
+            own = each.budget or {cause: 1.0}
+            whole = math.hypot(*own.values()) or 1.0
+            for name, part in own.items():
+                parts[name] = math.hypot(parts[name], u * part / whole)
+        size = budget.pop(cause) / (math.hypot(*parts.values()) or 1.0)
+        for name, part in parts.items():
+            budget[name] = math.hypot(budget.get(name, 0.0), size * part)
+        return replace(self, budget=budget)
 
     def times(self, factor: float) -> Self:
         """The estimate of a number that is so many times as large."""
@@ -164,16 +181,14 @@ def slope_error(x: Array, degree: int) -> float:
     return float(np.linalg.norm(np.linalg.pinv(np.vander(x, degree + 1, increasing=True))[1]))
 
 
-def straight_line(
-    x: npt.ArrayLike, y: npt.ArrayLike, noise: npt.ArrayLike
-) -> tuple[Estimate, Estimate]:
-    """Zero and slope of the line through points x, y (n,), y uncertain by `noise`.
+def straight_line(x: npt.ArrayLike, points: Sequence[Estimate]) -> tuple[Estimate, Estimate]:
+    """Zero and slope of the line through points (n,) at x.
 
     The uncertainties are those of the points carried over, and the scatter about the line where
     that is larger."""
-    x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+    x, (y, noise) = np.asarray(x, dtype=float), _values(points)
     least = np.finfo(float).eps * np.abs(y).max()
-    weight = np.maximum(np.broadcast_to(noise, y.shape), least) ** -2.0
+    weight = np.maximum(noise, least) ** -2.0
     # About the weighted mean, height and slope are independent of each other, and one point may
     # outweigh all others.
     x0, y0 = np.average(x, weights=weight), np.average(y, weights=weight)
@@ -182,16 +197,26 @@ def straight_line(
     scatter = max(1.0, np.sum(weight * (y - y0 - slope * (x - x0)) ** 2) / max(1, len(x) - 2))
     height, rise = np.sqrt(scatter / weight.sum()), np.sqrt(scatter / spread)
     zero = x0 - y0 / slope
+    sure = math.hypot(height / slope, (zero - x0) / slope * rise)
+    rises = np.sqrt(weight) * (x - x0) / spread
+    shifts = np.sqrt(weight) / weight.sum() + (zero - x0) * rises
     return (
-        estimate(zero, height=height / slope, slope=(zero - x0) / slope * rise),
-        estimate(slope, points=float(rise)),
+        estimate(zero, points=sure).told_apart("points", points, shifts),
+        estimate(slope, points=float(rise)).told_apart("points", points, rises),
     )
 
 
-def zero_and_slope(x: Array, y: Array, noise: Array) -> tuple[Estimate, Estimate]:
-    """Zero of the polynomial through points x, y (n,), and its slope; nan unless there is one.
+def _values(points: Sequence[Estimate]) -> tuple[Array, Array]:
+    """Values and uncertainties, each (n,)."""
+    values, noise = np.transpose([(point.value, point.uncertainty) for point in points])
+    return values, noise
 
-    Uncertain by the noise of every y, and a third of what the last degree changes."""
+
+def zero_and_slope(x: Array, points: Sequence[Estimate]) -> tuple[Estimate, Estimate]:
+    """Zero of the polynomial through points (n,) at x, and its slope; nan unless there is one.
+
+    Uncertain by the noise of every point, and a third of what the last degree changes."""
+    y, noise = _values(points)
 
     def fitted(values: Array, degree: int) -> Array:
         fit = Polynomial.fit(x, values, degree)
@@ -204,10 +229,11 @@ def zero_and_slope(x: Array, y: Array, noise: Array) -> tuple[Estimate, Estimate
     shifted = [fitted(y + shift, degree) - best for shift in np.diag(noise)]
     bent = np.abs(best - fitted(y, degree - 1)) / 3
     rows = best, np.linalg.norm([bent, *shifted], axis=0), bent, np.linalg.norm(shifted, axis=0)
-    zero, slope = (
-        Estimate(value, spread, {"degree": of_degree, "points": of_points})
-        for value, spread, of_degree, of_points in np.transpose(rows).tolist()
-    )
+    found = []
+    for k, (value, spread, bend, carried) in enumerate(np.transpose(rows).tolist()):
+        sure = Estimate(value, spread, {"curvature": bend, "points": carried})
+        found.append(sure.told_apart("points", points, [shift[k] for shift in shifted]))
+    zero, slope = found
     return zero, slope
 
 
@@ -257,7 +283,7 @@ def _extrapolated(found: Callable[[Array, int], float], points: Sequence[Estimat
     error is the term after the last, or the sum of all further terms where the last two changes
     have the same sign: with the largest ratio where their ratio has grown, as it does where the
     quantity is no smooth function."""
-    values, noise = np.transpose([(point.value, point.uncertainty) for point in points])
+    values, noise = _values(points)
     count = len(values)
     row = np.array([found(values, n) for n in range(count - 3, count + 1)])
     changes = np.abs(np.diff(row))
@@ -269,7 +295,8 @@ def _extrapolated(found: Callable[[Array, int], float], points: Sequence[Estimat
     carried = [found(values + shift, count) - row[-1] for shift in np.diag(noise)]
     rounding = np.finfo(float).eps * abs(row[-1]) * 2**count
     budget = {"extrapolation": rest, "rounding": rounding, "points": math.hypot(*carried)}
-    return Estimate(float(row[-1]), math.hypot(rest, rounding, *carried), budget)
+    sure = Estimate(float(row[-1]), math.hypot(rest, rounding, *carried), budget)
+    return sure.told_apart("points", points, carried)
 
 
 def _real_roots(polynomial: Polynomial) -> list[float]:

@@ -209,6 +209,21 @@ def test_an_uncertainty_is_made_up_of_its_causes():
     assert Estimate(1.0, 3.0).also(bracket=4.0).budget == {"measured": 3.0, "bracket": 4.0}
 
 
+def test_errors_of_others_are_told_apart_by_their_causes():
+    """By how much each of them moves the number; the combined uncertainty stays."""
+    others = [estimate(1.0, drift=0.3, solver=0.4), Estimate(2.0, 0.1), estimate(3.0, drift=7.0)]
+    whole = estimate(2.0, 2.0, drift=0.3, points=0.4)
+    apart = whole.told_apart("points", others, [5.0, 12.0, 0.0])
+    assert apart == whole
+    size = 0.8 / 13
+    assert apart.budget == pytest.approx(
+        {"drift": math.hypot(0.6, 3 * size), "solver": 4 * size, "points": 12 * size}
+    )
+    assert math.hypot(*apart.budget.values()) == pytest.approx(whole.uncertainty)
+    sure = estimate(1.0, points=0.0).told_apart("points", others[:1], [0.0])
+    assert sure.budget == {"drift": 0.0, "solver": 0.0}
+
+
 @pytest.mark.parametrize(("order", "off"), [(1.0, 3.0), (1.585, 0.0), (2.0, 1 / 3), (20.0, 3.0)])
 def test_a_zero_step_limit_is_sure_whatever_the_order(order, off):
     """The bounds of a uniform distribution are three variances off."""
@@ -574,10 +589,15 @@ def test_a_floor_that_carries_little_is_not_lost_where_the_ball_slips_on_both(et
 def test_a_bent_line_has_its_zero_and_slope(power):
     """Of growth along a line, where drag isn't linear: few claims of few sets would notice."""
     x, noise = np.array([0.0, 1.1, 1.5, 2.0]), np.full(4, 1e-6)
-    zero, slope = zero_and_slope(x, x**power - 1.7, noise)
+
+    def through(y):
+        return [estimate(each, time_step=u) for each, u in zip(y, noise, strict=True)]
+
+    zero, slope = zero_and_slope(x, through(x**power - 1.7))
     assert abs(zero.value - 1.7 ** (1 / power)) < 3 * zero.uncertainty < 0.03
     assert abs(slope.value - power * zero.value ** (power - 1)) < 3 * slope.uncertainty < 0.06
-    assert np.isnan([m.value for m in zero_and_slope(x, x + 1, noise)]).all()
+    assert zero.budget.keys() == slope.budget.keys() == {"curvature", "time_step"}
+    assert np.isnan([m.value for m in zero_and_slope(x, through(x + 1))]).all()
 
 
 @pytest.mark.parametrize("bend", [0.0, 1e-15, -1e-15, 1e-4])

@@ -124,27 +124,29 @@ def _slope(curve: Curve, states: Sequence[SteadyState]) -> Estimate | None:
     there, to the last flow."""
     cases = [each.case for each in states]
     f, onset = np.array(curve.flows), curve.p.omega_0
-    w, noises = np.transpose(
-        [(v.value, v.uncertainty) for v in (each.values["omega_c"] for each in states)]
-    )
+    orbits = [each.values["omega_c"] for each in states]
+    w, noises = np.transpose([(orbit.value, orbit.uncertainty) for orbit in orbits])
     noise, below = float(noises.max()), (w[1] - w[0]) / (f[1] - f[0])
     if curve.by == "neighbours" and len(set(map(settling.physical_case, cases))) == 1:
         wide, near = (w[3] - w[0]) / (f[3] - f[0]), (w[2] - w[1]) / (f[2] - f[1])
         bent = (near - wide) / 3
-        return estimate(near + bent, curvature=uniform(abs(bent)), states=2 * noise / (f[2] - f[1]))
+        of = estimate(near + bent, curvature=uniform(abs(bent)), states=2 * noise / (f[2] - f[1]))
+        return of.told_apart("states", orbits, noises)
     if curve.by == "jump" and cases[1:3] == [Case.RR, Case.SS]:
         secants, middles = np.diff(w[2:]) / np.diff(f[2:]), (f[2:-1] + f[3:]) / 2 - onset
         cubic, parabola = np.polyfit(middles, secants, 3), np.polyfit(middles[:3], secants[:3], 2)
         # noise of the states, propagated to the secants and from them to the slope
         to_secants = np.diff(np.eye(len(f) - 2), axis=0) / np.diff(f[2:])[:, None]
         weights = np.linalg.inv(np.vander(middles))[-1] @ to_secants
-        solved = math.hypot(*weights * noises[2:], *noises[:2] / (f[1] - f[0]))
+        carried = *weights * noises[2:], *noises[:2] / (f[1] - f[0])
         bent = uniform(abs(float(cubic[-1] - parabola[-1])))
         placed = abs(parabola[-2] * curve.noise)
-        return estimate(cubic[-1] - below, degree=bent, states=solved, threshold=placed)
+        of = estimate(cubic[-1] - below, degree=bent, states=math.hypot(*carried), threshold=placed)
+        return of.told_apart("states", [*orbits[2:], *orbits[:2]], carried)
     if curve.by == "mean" and cases == [Case.RR, Case.RR, Case.SS]:
         first, rise = w[1] + (onset - f[1]) * (w[1] - w[0]) / (f[1] - f[0]), f[2] - onset
-        return estimate((w[2] - first) / rise, 3 / rise, states=noise, threshold=curve.noise)
+        of = estimate((w[2] - first) / rise, 3 / rise, states=noise, threshold=curve.noise)
+        return of.told_apart("states", orbits, noises)
     return None
 
 

@@ -210,7 +210,7 @@ def _first_lines(runner: Runner, flows: Sequence[tuple[str, Parameters]]) -> Fou
 def _where_it_begins(near: Sequence[Edge]) -> Measurement | Missing:
     """The flow at which an edge meets the lifted ball: both have the same omega_c there."""
     noise = max(float(edge.uncertainty[2]) for edge in near)
-    apart = [estimate((edge.crossing - edge.lifted)[2], edge=noise) for edge in near]
+    apart = [edge.estimate((edge.crossing - edge.lifted)[2], noise) for edge in near]
     place = extrapolated_zero(np.array([edge.p.omega_0 for edge in near]), apart)
     tasks = [task for edge in near if edge.bracket for task in edge.bracket.tasks]
     at = Conditions(side="from above", by="unstable slipping meets the lifted ball")
@@ -286,21 +286,33 @@ class Edge:
         return Search(around, task, partial(ends_slipping, edge=self), width)
 
     @property
-    def uncertainty(self) -> Array:
-        """Standard uncertainty of the crossing (8,), by the last bracket and further lines.
+    def further(self) -> Array:
+        """How far lines beyond the last may move the crossing (8,).
 
-        They are taken to shrink as the last two did: together they are at least the last one, and
+        Moves are taken to shrink as the last two did: together they are at least the last one, and
         at most ten of its size; and no less than the distance from the crossing to the next line,
         through the mean of the last two runs."""
-        assert self.bracket is not None
         *_, before, last = (0.0, *(float(np.linalg.norm(move[SLIP_XYZ])) for move in self.moves))
         ratio = min(last / before, 0.9) if before else 0.0
         onward, roll = self.with_next_line(), self.p.R / self.p.r
         alike = np.array([1.0, 1.0, roll, 1.0, 1.0, 1.0, 1.0, 1.0])
         off, along = (onward.centre - self.crossing) * alike, onward.line * alike
         ahead = np.abs(off - (off @ along) / (along @ along) * along) / alike
-        moves = np.maximum(self.moves[-1] / (1 - ratio), ahead)
-        return np.asarray(np.hypot(self.bracket.place.uncertainty * self.line, moves))
+        return np.asarray(np.maximum(self.moves[-1] / (1 - ratio), ahead))
+
+    @property
+    def uncertainty(self) -> Array:
+        """Standard uncertainty of the crossing (8,), by the last bracket and further lines."""
+        assert self.bracket is not None
+        return np.asarray(np.hypot(self.bracket.place.uncertainty * self.line, self.further))
+
+    def estimate(self, value: float, uncertainty: float) -> Estimate:
+        """A number of the state at the crossing, by the causes of its uncertainty."""
+        assert self.bracket is not None
+        place, further = self.bracket.place, estimate(0.0, further_lines=1.0)
+        moves = place.uncertainty * self.line, self.further
+        sizes = [float(np.linalg.norm(move[SLIP_XYZ])) for move in moves]
+        return estimate(value, edge=uncertainty).told_apart("edge", (place, further), sizes)
 
     def rows(self) -> Measured:
         """Measurements of the state: omega_c, slips and the spin on the wall."""
@@ -316,7 +328,7 @@ class Edge:
         values["wall_spin"] = x.slip_x + roll * x.omega_c
         slips = max(sure.slip_x, sure.slip_y, sure.slip_z, roll * sure.omega_c)
         for name, value in values.items():
-            of = estimate(value, edge=slips / roll if name == "omega_c" else slips)
+            of = self.estimate(value, slips / roll if name == "omega_c" else slips)
             yield runner.measurement(self.set, p, f"edge_{name}", of, self.bracket.tasks, case="SS")
 
 
@@ -376,9 +388,7 @@ def birth(runner: Runner, sets: Sets, records: Records) -> Measured:
             found[name].append(end)
         for name, own in found.items():
             if len(own) >= len(FIRST_DRAGS):
-                slopes = [end.slope.value for end in own]
-                noise = [end.slope.uncertainty for end in own]
-                lags[name], _ = straight_line([end.lag for end in own], slopes, noise)
+                lags[name], _ = straight_line([end.lag for end in own], [end.slope for end in own])
         births = [(name, lag.value) for name, lag in lags.items() if lag.value > 0]
         drags = [(name, 1 / lag * k) for name, lag in births for k in NEARER_DRAGS]
     for name, p in sets.items():

@@ -132,6 +132,8 @@ def measure(runner: Runner, sets: Sets, records: Records) -> Measured:
                 ahead=plus.uncertainty * abs(minus.value),
                 back=minus.uncertainty * abs(plus.value),
             )
+            for side, of in ("ahead", plus), ("back", minus):
+                share = share.told_apart(side, [of], [1.0])
             yield push.row("filippov_share", share, own)
     for (name, arrow), count in left.items():
         yield runner.missing(name, f"slips {arrow} pass through several cases", count)
@@ -331,10 +333,12 @@ def steepest(runner: Runner, sets: Sets, records: Records) -> Measured:
         if not abs(angle) < 3:  # one near pi may come out on either side of it
             yield runner.missing(start.set, why)
             continue
-        scatter = np.sqrt(2.0 / len(fan)) * max(g.uncertainty for g in grown)
+        worst = max(grown, key=lambda g: g.uncertainty)
+        scatter = np.sqrt(2.0 / len(fan)) * worst.uncertainty
         others = np.arange(2, len(harmonics)) @ np.abs(harmonics[2:])
         first = float(np.abs(harmonics[1]))
         beta = estimate(angle, 1 / first, rates=float(scatter), harmonics=float(others))
+        beta = beta.told_apart("rates", [worst], [1.0])
         yield runner.measurement(start.set, start.p, "steepest", beta, tasks, **state_of(start.x0))
 
 
@@ -360,7 +364,7 @@ def bounds(runner: Runner, sets: Sets, records: Records) -> Measured:
     why = "no flow was found at which the wall alone carries the ball"
     yield from (runner.missing(name, why) for name in rough if name not in hanging)
     first = _growths(runner, [line.pushes[:2] for line in lines])
-    around = [line.around(seen.points[1]) for line, seen in zip(lines, first, strict=True)]
+    around = [line.around(seen.values) for line, seen in zip(lines, first, strict=True)]
     for line, seen, more in zip(lines, first, _growths(runner, around), strict=True):
         yield from _zero_and_slope(line, seen, more)
 
@@ -425,12 +429,16 @@ class Crossing:
 class Growths:
     """gamma at some flows of a line, for a vanishing step and size of slip."""
 
-    # flows, gamma and its uncertainty (3, n), rad s-1 and rad s-2; gamma is nan where a slip
-    # didn't last
-    points: Array
+    flows: list[float]  # rad s-1
+    gammas: list[Estimate]  # rad s-2; nan where a slip didn't last
     tasks: list[Task]
     # what became of slips that didn't last, and of runs that broke down
     strays: list[Measurement | Missing]
+
+    @property
+    def values(self) -> Array:
+        """Those of gamma."""
+        return np.array([gamma.value for gamma in self.gammas])
 
 
 def _growths(runner: Runner, rows: Sequence[Sequence[Push]]) -> list[Growths]:
@@ -443,26 +451,28 @@ def _growths(runner: Runner, rows: Sequence[Sequence[Push]]) -> list[Growths]:
         tasks.append([*large, small[1]])
     results, found = zip(tasks, runner.groups(tasks), strict=True), []
     for pushes in rows:
-        points, used, strays = [], list[Task](), list[Measurement | Missing]()
+        gammas, used, strays = list[Estimate](), list[Task](), list[Measurement | Missing]()
         for push in pushes:
-            p, (own, runs) = push.start.p, next(results)
+            own, runs = next(results)
             used += own
             if isinstance(runs, str):
                 why = f"from {push.inner.name}: the run {runs}"
                 strays.append(runner.missing(push.start.set, why, 2))
-                points.append((p.omega_0, math.nan, math.nan))
+                gammas.append(estimate(math.nan))
                 continue
             if stray := push.stray(own[:2], runs[:2]):
                 strays.append(stray)
             coarse, fine, half = (push.rates(run) for run in runs)
             best, change = limit_of_no_size(np.array([fine, half])), (fine - coarse)[0]
-            noise = math.hypot(
-                change * DOUBT,
-                uniform(best[1] - best[0]),
-                lag_error(runner, p, divisor) * slip_unit(p),
+            gamma = estimate(
+                best[0] + change * EXTRAPOLATION,
+                time_step=abs(change) * DOUBT,
+                degree=uniform(abs(best[1] - best[0])),
+                lag=lag_error(runner, push.start.p, divisor) * slip_unit(push.start.p),
             )
-            points.append((p.omega_0, best[0] + change * EXTRAPOLATION, noise))
-        found.append(Growths(np.reshape(points, (-1, 3)).T, used, strays))
+            gammas.append(gamma)
+        flows = [push.start.p.omega_0 for push in pushes]
+        found.append(Growths(flows, gammas, used, strays))
     return found
 
 
@@ -470,18 +480,19 @@ def _zero_and_slope(line: Crossing, seen: Growths, more: Growths) -> Measured:
     """Measurements of zero and slope of gamma along a line, from what was seen at the first flows
     and around the zero."""
     push, runner, tasks = line.pushes[0], line.pushes[0].runner, [*seen.tasks, *more.tasks]
-    if np.isnan(seen.points[1]).any():
+    if np.isnan(seen.values).any():
         why = f"slips {push.arrow} pass through several cases"
         yield from seen.strays or [runner.missing(push.start.set, why, 2)]
         return
-    points = np.concatenate([seen.points, more.points], axis=1)
-    flows, gamma, noise = points[:, ~np.isnan(points[1])]
-    # What the step changes may be little by chance at one of the flows.
-    q, noise = flows**line.power, np.maximum(noise, seen.points[2].max())
-    if line.is_curved:
-        zero, slope = zero_and_slope(q, gamma, noise)
-    else:  # the points share causes of error: more of them don't reduce the uncertainty
-        zero, slope = straight_line(q, gamma, noise * math.sqrt(len(q)))
+    known = zip([*seen.flows, *more.flows], [*seen.gammas, *more.gammas], strict=True)
+    flows, gammas = zip(*((flow, g) for flow, g in known if not math.isnan(g.value)), strict=True)
+    q = np.array(flows) ** line.power
+    # What the step changes may be little by chance at one of the flows. Points of a line share
+    # causes of error: more of them don't reduce the uncertainty.
+    least = max(gamma.uncertainty for gamma in seen.gammas)
+    more_sure = 1.0 if line.is_curved else math.sqrt(len(q))
+    points = [replace(g, uncertainty=max(g.uncertainty, least) * more_sure) for g in gammas]
+    zero, slope = zero_and_slope(q, points) if line.is_curved else straight_line(q, points)
     growth = f"growth of slip {push.arrow}, {push.start.name},"
     square = "_square" if line.power == 2 else ""
     if abs(zero.value) <= MOST_BEYOND * np.abs(q).max():

@@ -346,7 +346,7 @@ def mean_errors(runner: Runner, slipping: Sequence[tuple[Pulsation, float]]) -> 
         # Slip begins and ends within a coarse step, if there is one: the mean error is uncertain by
         # half of that part.
         within = abs(value) / round(task.steps / PERIODS) if task.settings.timestep else 0.0
-        error = estimate(value, drift_and_time_step=drift + within)
+        error = Estimate(value, drift + within, {"drift": drift, "time_step": within})
         slips = _slips(halved.case[-samples:])
         row = each.row("mean_error", error, [task], amplitude=amplitude, slips=slips)
         yield if_found(row, f"{at} is none")
