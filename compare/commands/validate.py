@@ -44,15 +44,17 @@ def run(args: argparse.Namespace) -> int:
         console.print(line(verdict), soft_wrap=True)
 
     with progress.reporter(quiet=args.quiet or args.json) as show:
-        wanted = {
-            "level": Level[args.level.upper()],
-            "claims": args.claim,
-            "sets": chosen,
-            "limit": args.limit,
-            "engine": args.engine,
-        }
-        wanted |= {"workers": running.workers(args), "progress": show, "announce": announce}
-        verdicts = validation.validate(args.output, **wanted)
+        verdicts = validation.validate(
+            args.output,
+            level=Level[args.level.upper()],
+            claims=args.claim,
+            sets=chosen,
+            limit=args.limit,
+            engine=args.engine,
+            workers=running.workers(args),
+            progress=show,
+            announce=announce,
+        )
     return _finish(
         verdicts, {Outcome.NOT_RUN, Outcome.INCONCLUSIVE} if chosen else set(), args, console
     )

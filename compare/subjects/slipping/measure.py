@@ -203,9 +203,9 @@ class Push:
         if np.isnan(coarse).any() or np.isnan(fine).any():
             return None
         best = fine + (fine - coarse) * EXTRAPOLATION
-        value, lower = limit_of_no_size(best)
-        step = limit_of_no_size(fine - coarse)[0] * DOUBT
-        size = (value - limit_of_no_size(best[-2:])[0]) / 3
+        value, lower = zero_size_limit(best)
+        step = zero_size_limit(fine - coarse)[0] * DOUBT
+        size = (value - zero_size_limit(best[-2:])[0]) / 3
         p = self.start.p
         # Slip at the wall alone of a ball that rolls on the floor neither turns nor changes its
         # load.
@@ -245,7 +245,7 @@ class Push:
         return self.runner.measurement(start.set, start.p, quantity, value, tasks, **at)
 
 
-def limit_of_no_size(rates: Array) -> Array:
+def zero_size_limit(rates: Array) -> Array:
     """Rates extrapolated to no slip, from rows (2 or 3, n) for sizes that halve."""
     *first, before, last = rates
     return np.asarray((first[0] - 6 * before + 8 * last) / 3 if first else 2 * last - before)
@@ -463,7 +463,7 @@ def _growths(runner: Runner, rows: Sequence[Sequence[Push]]) -> list[Growths]:
             if stray := push.stray(own[:2], runs[:2]):
                 strays.append(stray)
             coarse, fine, half = (push.rates(run) for run in runs)
-            best, change = limit_of_no_size(np.array([fine, half])), (fine - coarse)[0]
+            best, change = zero_size_limit(np.array([fine, half])), (fine - coarse)[0]
             gamma = estimate(
                 best[0] + change * EXTRAPOLATION,
                 time_step=abs(change) * DOUBT,
