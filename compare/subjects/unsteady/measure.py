@@ -344,7 +344,7 @@ def mean_errors(runner: Runner, slipping: Sequence[tuple[Pulsation, float]]) -> 
         spread = float(np.abs(turns * each.frequency - usual).max())
         drift = abs(mean - usual) + abs(mean - first) + abs(usual - before) + spread
         # Slip begins and ends within a coarse step, if there is one: the mean error is uncertain by
-        # half of that part.
+        # half of that part. Both may be of one sign, and are added.
         within = abs(value) / round(task.steps / PERIODS) if task.settings.timestep else 0.0
         error = Estimate(value, drift + within, {"drift": drift, "time_step": within})
         slips = _slips(halved.case[-samples:])
