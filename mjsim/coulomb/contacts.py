@@ -398,8 +398,8 @@ def is_fixed(model: Any, memory: Any, old: Any, turning: float) -> bool:
 
 @kernel
 def rolls(model: Any, memory: Any, contact: Any, old: Any) -> bool:
-    """Whether a rigid contact has rolled: as far over one of its bodies as over the other."""
-    if not memory.law.rigid or old.state != STICKS:
+    """Whether a contact has rolled: as far over one of its bodies as over the other."""
+    if old.state != STICKS:
         return False
     one, other = math.sqrt(square_way(contact, old, 0)), math.sqrt(square_way(contact, old, 1))
     alike = abs(one - other) <= ALIKE * max(one, other)

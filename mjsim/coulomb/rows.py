@@ -98,12 +98,13 @@ def add_turning(model: Any, data: Any, memory: Any, elapsed: float) -> None:
     """Let contacts that stick turn along with their bodies, or roll: rows leave out that Jacobians
     change.
 
-    What is added is -dJ/dt v; of rigid contacts, which lose the velocity that the turning shows,
-    half of it: so their forces do no work, and a disc that precesses keeps its energy.
+    What is added is -dJ/dt v, less half of the share that a row loses of its velocity in a step:
+    then friction does no work, before the turning or after it. Rigid contacts lose all, and a disc
+    that precesses keeps its energy.
     """
     contacts, rows, velocity = contacts_of(memory), rows_of(memory), reals(data.qvel, model.nv)
     reference, rigid = reals(data.efc_aref, data.nefc), memory.law.rigid
-    share = (0.5 if rigid else 1.0) / elapsed
+    damping = reals(data.efc_KBIP, (data.nefc, 4))
     for i in range(memory.contacts):
         contact = contacts[i]
         if contact.velocity[0] == math.inf or contact.dim == 1:
@@ -111,10 +112,11 @@ def add_turning(model: Any, data: Any, memory: Any, elapsed: float) -> None:
         if not rigid and contact.state != STICKS:
             continue
         closed = rigid and contact.state == STICKS and contact.load > 0
+        lost = 1.0 if rigid else min(model.opt.timestep * damping[contact.address + 1, 1], 1.0)
         for axis in range(0 if closed else 1, 3):
             before = 0.0
             for j in range(3):
                 before += contact.frame[axis, j] * contact.velocity[j]
             change = times(memory, rows[contact.address + axis], velocity) - before
-            contact.turned[axis] = change * share
+            contact.turned[axis] = change * (1 - lost / 2) / elapsed
             reference[contact.address + axis] -= contact.turned[axis]
