@@ -6,13 +6,12 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from model import InputError, Parameters
 from model.arrays import Array
-from model.parameters import ANY, Range, check_names, check_number, parse_number
+from model.parameters import Range, check_names, check_number, parse_number
 
 MOST = 100_000
 """Most runs of a sweep."""
@@ -30,26 +29,20 @@ class Axis:
     """Whether no more than the two ends were given."""
 
     @classmethod
-    def parse(
-        cls,
-        text: str,
-        units: Mapping[str, str] = FIELDS,
-        kind: str = "parameter",
-        allowed: Range = ANY,
-    ) -> Axis:
+    def parse(cls, text: str, units: Mapping[str, str] = FIELDS, kind: str = "parameter") -> Axis:
         """Read ``name=from:to:count``, ``name=from:to`` or ``name=a,b,c``; raises `InputError`."""
         name, _, rest = text.partition("=")
         check_names([name], list(units), kind)
         if ":" not in rest:
             parts = rest.split(",")
-            values = tuple(parse_number(name, part, units[name], allowed) for part in parts)
+            values = tuple(parse_number(name, part, units[name]) for part in parts)
             if len(set(values)) < len(values):
                 raise InputError(f"{name} = {rest} names a value twice")
             return cls(name, values)
         low, high, *count = rest.split(":")
         if len(count) > 1:
             raise InputError(f"{text!r} is no range: write {name}=from:to:count")
-        first, last = (parse_number(name, end, units[name], allowed) for end in (low, high))
+        first, last = (parse_number(name, end, units[name]) for end in (low, high))
         if first >= last:
             given = f"{name} = {first:g}:{last:g} {units[name]}"
             raise InputError(f"{given} is in the wrong order: a range runs from low to high")
@@ -59,9 +52,9 @@ class Axis:
         return cls(name, tuple(np.linspace(first, last, int(points)).tolist()))
 
     @classmethod
-    def several(cls, texts: Sequence[str], *kind: Any) -> list[Axis]:
-        """Read several texts as `parse` does; `InputError` for a name that comes twice."""
-        axes = [cls.parse(text, *kind) for text in texts]
+    def several(cls, texts: Sequence[str]) -> list[Axis]:
+        """Read several parameters as `parse` does; `InputError` for a name that comes twice."""
+        axes = [cls.parse(text) for text in texts]
         names = [axis.name for axis in axes]
         for name in names:
             if names.count(name) > 1:
