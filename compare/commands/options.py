@@ -358,7 +358,7 @@ def add_json(parser: Parser, shown: str = "print JSON") -> None:
 def add_engine(parser: Parser, default: str = "mujoco") -> None:
     """Options that choose an engine and its accuracy."""
     group = parser.add_argument_group("engine")
-    add_engine_name(group, default, f"analytic is event; default {default}")
+    add_engine_name(group, default, f"default {default}")
     group.add_argument(
         "--timestep", type=seconds, help="time step (default: the engine's; event has none)"
     )

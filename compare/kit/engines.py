@@ -268,8 +268,7 @@ ENGINES: dict[str, Engine] = {
 
 
 def engine(name: str) -> Engine:
-    """The engine of a name, or of its alias `analytic`; `InputError` if there is none."""
-    name = "event" if name == "analytic" else name
+    """The engine of a name; `InputError` if there is none."""
     if name not in ENGINES:
         hint, known = suggestion(name, ENGINES), few(ENGINES, MOST_NAMES)
         raise InputError(f"no engine is called {name!r}{hint}; there are {known}")
