@@ -37,10 +37,9 @@ STARTED_NEAR = 1 / 4
 """The round before those where a ball begins from what it settled to with a longer step."""
 STEPS_A_SAMPLE = 8
 """A coarse step is about a twentieth of sqrt(R/g), and the ball goes round more slowly."""
-SOLVED = 2e-11
+SOLVED = 1e-12
 """Relative accuracy to which contact forces are solved in a step; errors of one sign add up for a
-time 1/c. (Twenty times what it was before settled states of rigid contacts had been seen, which
-creep by as much.)"""
+time 1/c. (It was 2e-11 as long as settled states of rigid contacts crept by as much.)"""
 STATE_KNOWN = 1e-5
 """Relative uncertainty of omega_c up to which a state is known well enough for others to be
 measured from it. (Chosen after states off by 1.4e-4 had been at the default level.)"""
