@@ -41,8 +41,9 @@ MOST_STEPS = 3e5
 """Of a batch of several runs: some seconds, so that it is told how far they are."""
 HELD = 2**16
 """Most samples of a batch, some 11 MB; a run with more is written as it comes."""
-READ = 2**18
-"""Samples held in memory, some 45 MB: most runs are looked at soon after."""
+READ = 2**19
+"""Samples held in memory, some 90 MB: most runs are looked at soon after. The runs of `motions` at
+the default level are more than half of that: read again and again, they took ten minutes."""
 SOON_DONE = 10.0
 """Processor time of a batch, s, that isn't worth a file where most runs are removed."""
 FAILURES = "failures.json"
