@@ -68,7 +68,7 @@ def start(
     if law is None:
         return mujoco.MjData(model), Plain(model)
     offered = {
-        name: value for name, value in law.items() if name in ("rigid", "restitution", "baumgarte")
+        name: value for name, value in law.items() if name in ("rigid", "restitution", "servo")
     }
     stepper = door(model, **offered)
     stepper._law = replace(stepper._law, **{k: law[k] for k in law.keys() - offered.keys()})
@@ -408,24 +408,24 @@ def choices() -> Rows:
     ]
 
 
-def baumgarte() -> Rows:
+def servo() -> Rows:
     """Depth and creep with Baumgarte stabilisation and without."""
 
-    def grasped(scene: str, baumgarte: float | None) -> list[str]:
+    def grasped(scene: str, servo: float | None) -> list[str]:
         model = mujoco.MjModel.from_xml_path(f"docs/friction/{scene}.xml")
-        return settled(model, baumgarte)
+        return settled(model, servo)
 
-    def settled(model: Any, baumgarte: float | None) -> list[str]:
-        model.geom_margin[:] = 4e-3 if baumgarte else 0.0
+    def settled(model: Any, servo: float | None) -> list[str]:
+        model.geom_margin[:] = 4e-3 if servo else 0.0
         data = mujoco.MjData(model)
-        way = crept(data, Coulomb(model, baumgarte=baumgarte))
+        way = crept(data, Coulomb(model, servo=servo))
         return [f"{np.abs(data.contact.dist).max():.1e}", f"{way:.1e}"]
 
-    def rolls(baumgarte: float | None) -> list[str]:
+    def rolls(servo: float | None) -> list[str]:
         model = one('size=".01" mass=".03"', slope=5)
-        model.geom_margin[:] = 4e-3 if baumgarte else 0.0
+        model.geom_margin[:] = 4e-3 if servo else 0.0
         model.qpos0[2] = 0.01
-        data, stepper = mujoco.MjData(model), Coulomb(model, baumgarte=baumgarte)
+        data, stepper = mujoco.MjData(model), Coulomb(model, servo=servo)
         stepper.step(data, 500)
         speed = data.qvel[0]
         stepper.step(data, 500)
@@ -435,17 +435,17 @@ def baumgarte() -> Rows:
             f"{(data.qvel[0] - speed) / exact - 1:+.1e}",
         ]
 
-    def dropped(baumgarte: float | None) -> list[str]:
+    def dropped(servo: float | None) -> list[str]:
         model = one(BOX.replace("mass", 'euler="10 20 0" mass'))
         model.qpos0[2] = 0.2
-        return settled(model, baumgarte)
+        return settled(model, servo)
 
-    def resting(baumgarte: float | None) -> list[str]:
+    def resting(servo: float | None) -> list[str]:
         still = 0
         for seed in range(10):
             model = pile(seed, mixed=False)
-            model.geom_margin[:] = 4e-3 if baumgarte else 0.0
-            still += settle(mujoco.MjData(model), Coulomb(model, baumgarte=baumgarte))[0] < STILL
+            model.geom_margin[:] = 4e-3 if servo else 0.0
+            still += settle(mujoco.MjData(model), Coulomb(model, servo=servo))[0] < STILL
         return ["–", f"{still} of 10"]
 
     scenes: dict[str, Callable[[float | None], list[str]]] = {
@@ -502,7 +502,7 @@ TABLES: dict[str, Callable[[], Rows]] = {
     "landing": landing,
     "costs": costs,
     "choices": choices,
-    "baumgarte": baumgarte,
+    "servo": servo,
 }
 
 

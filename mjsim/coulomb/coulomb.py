@@ -54,7 +54,7 @@ class Coulomb:
         or one for each geom, of which two in contact have the larger, as MuJoCo mixes friction
     kinetic : friction of contacts that slide, in units of the friction that keeps them from it,
         0.001 … 1
-    baumgarte : Baumgarte stabilisation: time in which soft contacts lose their depth, s; None: they
+    servo : Baumgarte stabilisation: time in which soft contacts lose their depth, s; None: they
         sink in as MuJoCo has them. It needs geoms with a `margin`, more than bodies sink in, of
         which an open contact then takes no notice; and it must be slower than the contact, best
         five times the time constant of `solref`
@@ -82,7 +82,7 @@ class Coulomb:
         rigid: bool = False,
         restitution: float | Sequence[float] = 0.0,
         kinetic: float = 1.0,
-        baumgarte: float | None = None,
+        servo: float | None = None,
         share: float = Law.share,
         depth: float = Law.depth,
     ) -> None:
@@ -96,10 +96,10 @@ class Coulomb:
                 f"restitution = {_shown(restitution)} needs rigid=True: "
                 "solref says how soft contacts bounce"
             )
-        if baumgarte is not None:
-            _check_number("baumgarte", baumgarte, " s", float(model.opt.timestep), _LARGEST)
+        if servo is not None:
+            _check_number("servo", servo, " s", float(model.opt.timestep), _LARGEST)
             if rigid:
-                raise ValueError("baumgarte is for soft contacts: rigid ones have no depth")
+                raise ValueError("servo is for soft contacts: rigid ones have no depth")
         _check_number("kinetic", kinetic, "", 1e-3, 1.0)
         _check_number("share", share, "", 1e-9, 1.0)
         _check_number("depth", depth, "", 0.0, 0.1)
@@ -107,7 +107,7 @@ class Coulomb:
             rigid=bool(rigid),
             restitution=bounces,
             kinetic=float(kinetic),
-            baumgarte=float(baumgarte or 0.0),
+            servo=float(servo or 0.0),
             share=float(share),
             depth=float(depth),
         )

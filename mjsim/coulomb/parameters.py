@@ -20,7 +20,7 @@ class Law:
     """Of each geom; two in contact have the larger one, as of friction. None: nothing bounces."""
     kinetic: float = 1.0
     """Friction of contacts that slide, in units of what keeps them from it."""
-    baumgarte: float = 0.0
+    servo: float = 0.0
     """Baumgarte stabilisation: time in which soft contacts lose their depth, s; 0: never."""
     share: float = 5e-2
     """Share of gravity to which the slip of contacts, and what rigid ones bear, must be

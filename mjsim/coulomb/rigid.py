@@ -187,7 +187,7 @@ def take_depth_away(model: Any, data: Any, memory: Any) -> None:
     reference = reals(data.efc_aref, data.nefc)
     for i in range(memory.contacts):
         contact = contacts[i]
-        lift = contact.lift - model.opt.timestep / memory.law.baumgarte * contact.gap
+        lift = contact.lift - model.opt.timestep / memory.law.servo * contact.gap
         contact.lift = min(max(lift, 0.0), contact.margin)
         stiffness = spring[contact.address, 0] * spring[contact.address, 2]
         closed = contact.lift > 0 or contact.gap <= 0

@@ -137,7 +137,7 @@ def find_references(model: Any, data: Any, memory: Any, since: float) -> None:
     multiply(memory, reals(data.qacc, model.nv))
     if memory.law.rigid:
         stiffen(model, data, memory)
-    elif memory.law.baumgarte:
+    elif memory.law.servo:
         take_depth_away(model, data, memory)
     if since > 0:
         add_turning(model, data, memory, since)

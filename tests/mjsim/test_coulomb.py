@@ -145,7 +145,7 @@ def test_baumgarte_stabilisation_takes_the_depth_away():
     it."""
     slope, ball = np.radians(5), '<geom size=".05" mass=".03" margin="2e-3"/>'
     model, data = scene(slope, geom=ball, option='tolerance="1e-12"')
-    law = Coulomb(model, baumgarte=0.1)
+    law = Coulomb(model, servo=0.1)
     law.step(data, 500)
     speed = data.qvel[0]
     law.step(data, 500)
@@ -153,7 +153,7 @@ def test_baumgarte_stabilisation_takes_the_depth_away():
     assert data.qvel[0] - speed == pytest.approx(5 / 7 * G * np.sin(slope), rel=1e-4)
     model, data = scene(geom=BOX.replace("mass", 'euler="10 20 0" margin="2e-3" mass'))
     data.qpos[2], free = 0.2, np.sqrt(2 * (0.2 - 0.075) / G)
-    law = Coulomb(model, baumgarte=0.1)
+    law = Coulomb(model, servo=0.1)
     law.step(data, int(free / model.opt.timestep) - 12)
     assert data.qvel[2] == pytest.approx(-G * data.time, rel=1e-9)  # the margin bears nothing
     law.step(data, 2000)
@@ -265,7 +265,7 @@ def test_a_callback_of_somebody_else_is_called_first_and_comes_back():
             ({}, {"rigid": True, "restitution": wrong}, r"restitution = .* must be from 0 to 1")
             for wrong in (-0.1, 1.1, math.nan, "half")
         ),
-        ({}, {"baumgarte": 1e-3}, r"baumgarte = 0\.001 s must be at least 0\.002 s"),
+        ({}, {"servo": 1e-3}, r"servo = 0\.001 s must be at least 0\.002 s"),
     ],
 )
 def test_of_what_no_law_is_made(given, law, words):

@@ -402,11 +402,11 @@ def test_states_that_are_none(alone):
 WRONG = [2.5, -1, "3", np.zeros((3, 3)), math.nan, math.inf, 1j, object, 10**400, "x" * 999]
 
 
-@pytest.mark.parametrize("name", ["nstep", "rigid", "restitution", "kinetic", "baumgarte", "share"])
+@pytest.mark.parametrize("name", ["nstep", "rigid", "restitution", "kinetic", "servo", "share"])
 @pytest.mark.parametrize("wrong", WRONG, ids=lambda wrong: f"{str(wrong)[:9]}")
 def test_wrong_types_and_values_are_told_in_a_line(name, wrong):
     model, data = scene()
-    if name == "baumgarte" and isinstance(wrong, float) and wrong == 2.5:
+    if name == "servo" and isinstance(wrong, float) and wrong == 2.5:
         wrong = 1e-9
     given = {name: wrong} | ({"rigid": True} if name == "restitution" else {})
     use = functools.partial(Coulomb, model, **given)
