@@ -56,7 +56,7 @@ def validate(parser: Parser) -> None:
     The exit code is 1 if a verdict on the engine on trial isn't the expected one. What the
     engines beside it refute is told, and changes nothing."""
     level = parser.add_mutually_exclusive_group()
-    for name, takes in (("quick", "some four minutes"), ("full", "an hour or more")):
+    for name, takes in (("quick", "three to six minutes"), ("full", "an hour or more")):
         takes = f"{takes} (default: in between)"
         level.add_argument(
             f"--{name}",
