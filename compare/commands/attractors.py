@@ -241,8 +241,9 @@ def run_basins(args: argparse.Namespace) -> int:
         )
     where = (
         f"MuJoCo differs at {len(differ)} of {mapped.mujoco.size} starts, so many cells from a "
-        f"boundary: {differ}"
+        f"boundary: {differ}; {mapped.undecided} more came to nothing"
     )
-    data = {"shares": shares, "mujoco": mapped.mujoco.size, "differences": differ}
+    data = {"shares": shares, "mujoco": mapped.mujoco.size}
+    data |= {"differences": differ, "undecided": mapped.undecided}
     options.show(data, args.json, *said, *([where] if args.mujoco else []))
     return 0

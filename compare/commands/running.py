@@ -75,7 +75,7 @@ def workers(args: argparse.Namespace) -> Workers:
 def campaign(args: argparse.Namespace, doing: str, **more: Any) -> Iterator[Campaign]:
     """A campaign in a directory of ``--output``, whose progress is shown."""
     with (
-        progress.reporter(args.quiet or args.json, counted=True) as show,
+        progress.reporter(args.quiet, counted=True) as show,
         Campaign(
             args.output, workers(args), limit=args.limit, report=show, doing=doing, **more
         ) as made,

@@ -30,6 +30,11 @@ _TOLD_APART = (
 def run(args: argparse.Namespace) -> int:
     """Simulate one run, store it as far as it came, and describe it."""
     p, flow = options.parameters(args), running.flow(args)
+    if args.flow and flow and not args.time and flow.start[-1] > DURATION:
+        options.warn(
+            f"{args.flow} lasts {flow.start[-1]:.10g} s, of which the first {DURATION:g} s are run: "
+            f"--time says how long"
+        )
     args.time = args.time or DURATION
     if args.flow and flow and flow.start[0] >= args.time:
         raise InputError(

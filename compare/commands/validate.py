@@ -43,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
             console.print(title)
         console.print(line(verdict), soft_wrap=True)
 
-    with progress.reporter(quiet=args.quiet or args.json) as show:
+    with progress.reporter(args.quiet) as show:
         verdicts = validation.validate(
             args.output,
             level=Level[args.level.upper()],

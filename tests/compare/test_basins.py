@@ -88,6 +88,8 @@ def test_basins_count_measure_and_keep_their_points(tmp_path):
     )
     b = Basins(BISTABLE, (0.0,) * 8, *axes, attractors, 2, np.array([[2, 2], [0, 0]]), 1e-3)
     assert b.differences().tolist() == [2.0, 1.0]
+    b.mujoco[0, 0] = ATTRACTORS.index("undecided")
+    assert (b.differences().tolist(), b.undecided) == ([1.0], 1)
     b.attractors[3] = 2
     assert (b.share("hops"), b.share("RR")) == ((6, 16), (0, 16))
     b.save(tmp_path / "b.json")

@@ -134,6 +134,15 @@ def test_a_flow_that_begins_after_the_run_is_refused(tmp_path, capsys):
     assert "begins at t = 1700000000 s, but the run, from 0 on, ends at 5 s" in said
 
 
+def test_a_flow_that_is_cut_off_says_so(tmp_path, capsys):
+    (long := tmp_path / "long.csv").write_text("0, 3\n60, 9\n")
+    words = "simulate", "--engine", "event", "--flow", long
+    *_, said = carried_out(capsys, *words)
+    assert "lasts 60 s, of which the first 10 s are run" in said
+    *_, said = carried_out(capsys, *words, "--time", 1)
+    assert not said
+
+
 @pytest.mark.parametrize("design", ["--vary eta=0.1,0.5", "--vary eta=0.1:0.5 --random 2"])
 def test_each_set_of_a_sweep_has_contacts_that_suit_it(tmp_path, capsys, design):
     """Fast contacts would chatter where mu eta is large; on the other set they are the defaults."""

@@ -60,7 +60,8 @@ class Basins:
         return int(np.sum(self.attractors == ATTRACTORS.index(attractor))), self.attractors.size
 
     def differences(self) -> Array:
-        """Distances from a boundary, in fine cells, of points where MuJoCo differs."""
+        """Distances from a boundary, in fine cells, of points where MuJoCo differs; a run that came
+        to nothing does not."""
         from scipy.ndimage import distance_transform_cdt  # slow to import
 
         distance = np.zeros(self.attractors.shape)
@@ -69,7 +70,13 @@ class Basins:
             # 0 outside its basin
             distance += distance_transform_cdt(own, metric="chessboard")[1:-1, 1:-1]
         coarse = np.s_[:: self.coarse, :: self.coarse]
-        return np.asarray(distance[coarse][self.attractors[coarse] != self.mujoco])
+        differs = (self.attractors[coarse] != self.mujoco) & (self.mujoco != UNDECIDED)
+        return np.asarray(distance[coarse][differs])
+
+    @property
+    def undecided(self) -> int:
+        """How many runs of MuJoCo came to nothing: to no attractor that is known, or to no end."""
+        return int(np.sum(self.mujoco == UNDECIDED))
 
     def save(self, path: Path) -> None:
         """Write it as JSON."""
