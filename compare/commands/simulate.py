@@ -32,8 +32,8 @@ def run(args: argparse.Namespace) -> int:
     p, flow = options.parameters(args), running.flow(args)
     if args.flow and flow and not args.time and flow.start[-1] > DURATION:
         options.warn(
-            f"{args.flow} lasts {flow.start[-1]:.10g} s, of which the first {DURATION:g} s are run: "
-            f"--time says how long"
+            f"{args.flow} lasts {flow.start[-1]:.10g} s, of which the first {DURATION:g} s are "
+            "run: --time says how long"
         )
     args.time = args.time or DURATION
     if args.flow and flow and flow.start[0] >= args.time:
