@@ -9,7 +9,7 @@ import functools
 from collections import Counter
 from pathlib import Path
 
-LINES, PARAMETERS = 75, 6
+LINES, PARAMETERS, LOCALS = 75, 6, 20
 ROOT = Path(__file__).parents[1]
 EXCEPTIONS = {
     # calls of users, whose options have names and defaults
@@ -66,6 +66,16 @@ def test_functions_have_no_more_lines_and_parameters_than_a_reader_keeps_in_mind
             if lines > LINES or len(names - {"self", "cls"}) > PARAMETERS:
                 large.add(f"{path.as_posix()}:{node.name}")
     assert large == EXCEPTIONS
+
+
+def test_functions_of_the_law_have_few_locals():
+    for path in (ROOT / "mjsim/coulomb").glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.FunctionDef):
+                named = (each for each in ast.walk(node) if isinstance(each, ast.Name))
+                own = {each.id for each in named if isinstance(each.ctx, ast.Store)}
+                own -= {each.arg for each in node.args.args}
+                assert len(own) <= LOCALS, f"{path.name}: {node.name}"
 
 
 def test_names_have_one_meaning_in_a_package():

@@ -148,8 +148,6 @@ def find(model: Any, data: Any, memory: Any) -> None:
     store_poses(model, data, memory)
     found = engine_contacts(data.contact, data.ncon)
     contacts = contacts_at(memory.contact_at, data.ncon)
-    xpos = reals(data.geom_xpos, (model.ngeom, 3))
-    xmat = reals(data.geom_xmat, (model.ngeom, 3, 3))
     damping = reals(data.efc_KBIP, (data.nefc, 4))
     count = 0
     for i in range(data.ncon):
@@ -169,23 +167,31 @@ def find(model: Any, data: Any, memory: Any) -> None:
             contact.pos[j] = given.pos[j]
         for j in range(9):
             contact.frame[j // 3, j % 3] = given.frame[j]
-        for side in range(2):
-            g = given.geom[side]
-            contact.geoms[side] = g
-            x = given.pos[0] - xpos[g, 0]
-            y = given.pos[1] - xpos[g, 1]
-            z = given.pos[2] - xpos[g, 2]
-            for axis in range(3):
-                u, v, w = xmat[g, 0, axis], xmat[g, 1, axis], xmat[g, 2, axis]
-                contact.place[side, axis] = u * x + v * y + w * z
-                for of in range(3):
-                    frame = contact.frame[of]
-                    contact.axes[side, axis, of] = u * frame[0] + v * frame[1] + w * frame[2]
-        for axis in range(3):
-            contact.normal[axis] = contact.axes[0, axis, 0]
+        place_on_bodies(model, data, contact, given)
         count += 1
     memory.contacts, memory.rows, memory.ncon = count, data.nefc, data.ncon
     memory.first_dry, memory.dry = data.ne, data.nf
+
+
+@kernel
+def place_on_bodies(model: Any, data: Any, contact: Any, given: Any) -> None:
+    """Find where a contact is on both bodies, and its axes in those of their geoms."""
+    xpos = reals(data.geom_xpos, (model.ngeom, 3))
+    xmat = reals(data.geom_xmat, (model.ngeom, 3, 3))
+    for side in range(2):
+        g = given.geom[side]
+        contact.geoms[side] = g
+        x = given.pos[0] - xpos[g, 0]
+        y = given.pos[1] - xpos[g, 1]
+        z = given.pos[2] - xpos[g, 2]
+        for axis in range(3):
+            u, v, w = xmat[g, 0, axis], xmat[g, 1, axis], xmat[g, 2, axis]
+            contact.place[side, axis] = u * x + v * y + w * z
+            for of in range(3):
+                frame = contact.frame[of]
+                contact.axes[side, axis, of] = u * frame[0] + v * frame[1] + w * frame[2]
+    for axis in range(3):
+        contact.normal[axis] = contact.axes[0, axis, 0]
 
 
 @kernel

@@ -230,12 +230,10 @@ def find_levels(memory: Any, first: int, start: int) -> int:
 @kernel
 def find_residual(model: Any, data: Any, memory: Any, first: int, a: Any) -> float:
     """M a - q - J' f of an island, with all forces; its square in units of M's diagonal."""
-    rows, contacts, dofs = rows_of(memory), contacts_of(memory), dofs_of(memory)
+    dofs, residual, square = dofs_of(memory), reals(memory.residual_at, model.nv), 0.0
     starts, lengths = integers(model.M_rowadr, model.nv), integers(model.M_rownnz, model.nv)
     columns, inertia = integers(model.M_colind, model.nC), reals(data.M, model.nC)
-    smooth, residual = reals(data.qfrc_smooth, model.nv), reals(memory.residual_at, model.nv)
-    local = reals(memory.local_at, model.nv)
-    i, square = first, 0.0
+    smooth, i, u = reals(data.qfrc_smooth, model.nv), first, dofs[first].unit
     while i >= 0:  # M is a lower triangle, row by row; rows end on the diagonal
         residual[i] = -smooth[i]
         for n in range(starts[i], starts[i] + lengths[i] - 1):
@@ -243,33 +241,40 @@ def find_residual(model: Any, data: Any, memory: Any, first: int, a: Any) -> flo
             residual[columns[n]] += inertia[n] * a[i]
         residual[i] += inertia[starts[i] + lengths[i] - 1] * a[i]
         i = dofs[i].next
-    u = dofs[first].unit
     while u >= 0:
-        unit, column = rows[u], columns_of(memory, rows[u])
-        jacobian = jacobians_of(memory, unit)
-        for n in range(len(column)):
-            local[n] = a[column[n]]
-        for r in range(unit.dim):
-            row, acceleration = rows[u + r], 0.0
-            for n in range(len(column)):
-                acceleration += jacobian[r, n] * local[n]
-            row.residual = acceleration - row.reference - row.R * row.held
-        if unit.contact < 0:
-            unit.force = row_force(unit)
-        else:
-            contact = contacts[unit.contact]
-            contact.state = contact_forces(rows, contact)
-        for n in range(len(column) if unit.force != 0 else 0):
-            force = 0.0
-            for r in range(unit.dim):
-                force += jacobian[r, n] * rows[u + r].force
-            residual[column[n]] -= force
-        u = unit.next
+        u = subtract_forces(memory, u, a, residual)
     i = first
     while i >= 0:
         square += residual[i] ** 2 / inertia[starts[i] + lengths[i] - 1]
         i = dofs[i].next
     return square
+
+
+@kernel
+def subtract_forces(memory: Any, u: int, a: Any, residual: Any) -> int:
+    """Find the forces of a unit at accelerations `a`, and take J' f off the residual; return the
+    next unit of its island."""
+    rows, contacts = rows_of(memory), contacts_of(memory)
+    unit, column = rows[u], columns_of(memory, rows[u])
+    jacobian, local = jacobians_of(memory, unit), reals(memory.local_at, len(column))
+    for n in range(len(column)):
+        local[n] = a[column[n]]
+    for r in range(unit.dim):
+        row, acceleration = rows[u + r], 0.0
+        for n in range(len(column)):
+            acceleration += jacobian[r, n] * local[n]
+        row.residual = acceleration - row.reference - row.R * row.held
+    if unit.contact < 0:
+        unit.force = row_force(unit)
+    else:
+        contact = contacts[unit.contact]
+        contact.state = contact_forces(rows, contact)
+    for n in range(len(column) if unit.force != 0 else 0):
+        force = 0.0
+        for r in range(unit.dim):
+            force += jacobian[r, n] * rows[u + r].force
+        residual[column[n]] -= force
+    return int(unit.next)
 
 
 @kernel

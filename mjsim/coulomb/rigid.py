@@ -29,25 +29,15 @@ FREE, SLIDE = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 @kernel
 def stiffen(model: Any, data: Any, memory: Any) -> None:
     """Make contacts stiff, and let them ask for velocities at the end of the step."""
-    contacts, rows, law, h = contacts_of(memory), rows_of(memory), memory.law, model.opt.timestep
+    contacts, h = contacts_of(memory), model.opt.timestep
     estimate, velocity = reals(data.efc_diagA, data.nefc), reals(data.efc_vel, data.nefc)
     R, reference = reals(data.efc_R, data.nefc), reals(data.efc_aref, data.nefc)
-    free = reals(data.qacc_smooth, model.nv)  # of the last step, without impacts
     for i in range(memory.contacts):
-        contact = contacts[i]
-        normal, first = rows[contact.address], contact.address
-        stuck = estimate[first] * normal.remembered > STUCK * memory.gravity
-        fastest = math.inf if is_moved_by_hand(model, contact) else h * memory.gravity
-        goal = velocity_to_ask_for(model, memory, contact, 0.0 if stuck else fastest)
-        share = restitution_of(memory, contact) if memory.bounces else 0.0
-        if share > 0:
-            speed, fall = velocity[first], h * max(-times(memory, normal, free), 0.0)
-            parts = speed > BOUNCES * h * memory.gravity
-            comes = contact.load == 0 and contact.gap + h * (speed - fall) > 0
-            # what an impact makes touch, or touch again, bounces in the next step
-            bounce = rebound(share, contact.gap, speed, fall, h)
-            goal = -APART * h if parts or comes else max(goal, bounce)
-        factor = law.regularisation * estimate[first] / R[first]
+        contact, first = contacts[i], contacts[i].address
+        goal = velocity_to_ask_for(model, memory, contact, estimate[first])
+        if memory.bounces:
+            goal = bounced(model, data, memory, contact, goal)
+        factor = memory.law.regularisation * estimate[first] / R[first]
         for r in range(first, first + contact.dim):
             R[r] *= factor
             reference[r] = ((goal if r == first else 0.0) - velocity[r]) / h
@@ -67,8 +57,9 @@ def is_moved_by_hand(model: Any, contact: Any) -> bool:
 
 
 @kernel
-def velocity_to_ask_for(model: Any, memory: Any, contact: Any, fastest: float) -> float:
-    """Normal velocity that closes a gap in the step, or takes a share of a depth away, m s-1.
+def velocity_to_ask_for(model: Any, memory: Any, contact: Any, estimate: float) -> float:
+    """Normal velocity that closes a gap in the step, or takes a share of a depth away, m s-1; by
+    the inverse mass that the engine estimates, kg-1.
 
     So it does of the gap of a contact that has borne something: closed at once, that would be an
     impact.
@@ -77,7 +68,27 @@ def velocity_to_ask_for(model: Any, memory: Any, contact: Any, fastest: float) -
     if contact.gap > 0:
         return float(-contact.gap / h * (law.push if contact.load > 0 else 1.0))
     kept = law.depth * (h / USUAL_STEP) ** 2 * smaller_radius(model, contact)
+    fastest = math.inf if is_moved_by_hand(model, contact) else h * memory.gravity
+    if estimate * rows_of(memory)[contact.address].remembered > STUCK * memory.gravity:
+        fastest = 0.0
     return float(min(law.push * max(-contact.gap - kept, 0.0) / h, fastest))
+
+
+@kernel
+def bounced(model: Any, data: Any, memory: Any, contact: Any, goal: float) -> float:
+    """Normal velocity that a contact asks for which may bounce, m s-1; `goal` if it doesn't.
+
+    What an impact makes touch, or touch again, bounces in the next step.
+    """
+    share, h = restitution_of(memory, contact), model.opt.timestep
+    if share == 0:
+        return goal
+    free = reals(data.qacc_smooth, model.nv)  # of the last step, without impacts
+    speed = reals(data.efc_vel, data.nefc)[contact.address]
+    fall = h * max(-times(memory, rows_of(memory)[contact.address], free), 0.0)
+    parts = speed > BOUNCES * h * memory.gravity
+    comes = contact.load == 0 and contact.gap + h * (speed - fall) > 0
+    return -APART * h if parts or comes else max(goal, rebound(share, contact.gap, speed, fall, h))
 
 
 @kernel
@@ -342,37 +353,48 @@ def add_gyroscopic_moments(model: Any, data: Any, memory: Any, known: bool, over
     A body that turns freely keeps its energy and the size of its angular momentum; and its centre
     of mass keeps its velocity where it is not the body's origin.
     """
-    bodies, h, n = bodies_at(memory.body_at, memory.free_bodies), model.opt.timestep, model.nbody
-    bias, inertias = reals(data.qfrc_bias, model.nv), reals(data.crb, (n, 10))
-    velocities, centres = reals(data.cvel, 6 * n), reals(data.subtree_com, 3 * n)
-    origins, axes_of = reals(data.xpos, 3 * n), reals(data.xmat, 9 * n)
+    bodies = bodies_at(memory.body_at, memory.free_bodies)
     for i in range(len(bodies)):
-        free = bodies[i]
-        b, of = free.body, inertias[free.body]
-        inertia = (of[0], of[3], of[4]), (of[3], of[1], of[5]), (of[4], of[5], of[2])
-        axes = (
-            vector_at(axes_of, 9 * b),
-            vector_at(axes_of, 9 * b + 3),
-            vector_at(axes_of, 9 * b + 6),
-        )
-        spin = vector_at(velocities, 6 * b)
-        momentum, pushed = applied(inertia, spin), (0.0, 0.0, 0.0)
-        if known and over:
-            gained = plus(momentum, -1.0, applied(axes, vector_at(free.coasting, 0)))
-            pushed = rotated(gained, times_vector(-h, spin))
-        elif known:
-            pushed = vector_at(free.pushed, 0)
-        change, after = turned_freely(inertia, momentum, spin, pushed, h)
-        arm = plus(vector_at(centres, 3 * b), -1.0, vector_at(origins, 3 * b))
-        force, moment = of_the_origin(of[9], arm, spin, after, h)
-        moment = plus(plus(moment, -1 / h, change), -1.0, cross(spin, momentum))
-        coasting = plus(momentum, 1.0, change)
-        for j in range(3):
-            column = axes[0][j], axes[1][j], axes[2][j]
-            bias[free.dof + j] += force[j]
-            for k in range(3):
-                bias[free.dof + 3 + j] += column[k] * moment[k]
-            free.pushed[j], free.coasting[j] = pushed[j], dot(column, coasting)
+        add_moment_of(model, data, bodies[i], known, over)
+
+
+@kernel
+def add_moment_of(model: Any, data: Any, free: Any, known: bool, over: bool) -> None:
+    """The gyroscopic moment of a free body, in its own axes, and the force on its origin."""
+    bias, h = reals(data.qfrc_bias, model.nv), model.opt.timestep
+    mass, inertia, axes, spin, arm = motion_of(model, data, free.body)
+    momentum, pushed = applied(inertia, spin), (0.0, 0.0, 0.0)
+    if known and over:
+        gained = plus(momentum, -1.0, applied(axes, vector_at(free.coasting, 0)))
+        pushed = rotated(gained, times_vector(-h, spin))
+    elif known:
+        pushed = vector_at(free.pushed, 0)
+    change, after = turned_freely(inertia, momentum, spin, pushed, h)
+    force, moment = of_the_origin(mass, arm, spin, after, h)
+    moment = plus(plus(moment, -1 / h, change), -1.0, cross(spin, momentum))
+    coasting = plus(momentum, 1.0, change)
+    for j in range(3):
+        column = axes[0][j], axes[1][j], axes[2][j]
+        bias[free.dof + j] += force[j]
+        for k in range(3):
+            bias[free.dof + 3 + j] += column[k] * moment[k]
+        free.pushed[j], free.coasting[j] = pushed[j], dot(column, coasting)
+
+
+@kernel
+def motion_of(model: Any, data: Any, b: int) -> Any:
+    """Mass of a free body, its inertia about the centre of mass, its axes, spin, and the way from
+    its origin to the centre of mass."""
+    n = model.nbody
+    of, axes, spins = reals(data.crb, (n, 10))[b], reals(data.xmat, 9 * n), reals(data.cvel, 6 * n)
+    centres, origins = reals(data.subtree_com, 3 * n), reals(data.xpos, 3 * n)
+    return (
+        of[9],
+        ((of[0], of[3], of[4]), (of[3], of[1], of[5]), (of[4], of[5], of[2])),
+        (vector_at(axes, 9 * b), vector_at(axes, 9 * b + 3), vector_at(axes, 9 * b + 6)),
+        vector_at(spins, 6 * b),
+        plus(vector_at(centres, 3 * b), -1.0, vector_at(origins, 3 * b)),
+    )
 
 
 @kernel
