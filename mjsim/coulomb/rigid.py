@@ -88,7 +88,9 @@ def bounced(model: Any, data: Any, memory: Any, contact: Any, goal: float) -> fl
     fall = h * max(-times(memory, rows_of(memory)[contact.address], free), 0.0)
     parts = speed > BOUNCES * h * memory.gravity
     comes = contact.load == 0 and contact.gap + h * (speed - fall) > 0
-    return -APART * h if parts or comes else max(goal, rebound(share, contact.gap, speed, fall, h))
+    if parts or comes:
+        return float(-APART * h)
+    return max(goal, rebound(share, contact.gap, speed, fall, h))
 
 
 @kernel
