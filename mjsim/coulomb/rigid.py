@@ -90,7 +90,7 @@ def bounced(model: Any, data: Any, memory: Any, contact: Any, goal: float) -> fl
     comes = contact.load == 0 and contact.gap + h * (speed - fall) > 0
     if parts or comes:
         return float(-APART * h)
-    return max(goal, rebound(share, contact.gap, speed, fall, h))
+    return float(max(goal, rebound(share, contact.gap, speed, fall, h)))
 
 
 @kernel
