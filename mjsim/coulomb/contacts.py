@@ -2,7 +2,8 @@
 
 Each contact of the step before hands on its state, load and friction to the one that is now nearest
 to it on both bodies; friction turns with these, and what several hand on adds up. Colliders drop
-points of flat faces that still overlap, which are put back, and add some, which are left out.
+points of flat faces that still overlap, which are put back, and add some, which are left out like the
+seams of a floor.
 """
 
 from __future__ import annotations
@@ -41,7 +42,18 @@ from .memory import (
     pairs_at,
     rows_of,
 )
-from .parameters import ALIKE, APART, AT_MOST, CORNER, FARTHEST, FLUSH, STILL, UNMOVED
+from .parameters import (
+    ALIGNED,
+    ALIKE,
+    APART,
+    AT_MOST,
+    CORNER,
+    EDGE,
+    FARTHEST,
+    FLUSH,
+    STILL,
+    UNMOVED,
+)
 
 SIZE = MJ_CONTACT.itemsize
 WORDS = SIZE // 8
@@ -489,6 +501,64 @@ def leave_added_points_out(model: Any, data: Any, memory: Any) -> bool:
             leave_out(data, found[new.index])
             left_out = True
     return left_out
+
+
+@kernel
+def leave_inner_edges_out(model: Any, data: Any, memory: Any) -> bool:
+    """Leave out edges between pieces of a floor, at which what slides from one to the next would
+    stop: contacts about to close, with geoms below one that bears something.
+
+    Returns whether there were any.
+    """
+    contacts, found = contacts_of(memory), engine_contacts(data.contact, data.ncon)
+    velocity, h, left_out = reals(data.efc_vel, data.nefc), model.opt.timestep, False
+    for i in range(memory.contacts):
+        edge, inner = contacts[i], False
+        closing = max(-velocity[edge.address], 0.0) + h * memory.gravity
+        closes = edge.load == 0 and edge.gap < AT_MOST * h * closing
+        for k in range(memory.contacts if closes else 0):
+            if contacts[k].load > 0 and not inner:
+                inner = lies_below(model, data, edge, contacts[k])
+        if inner:
+            leave_out(data, found[edge.index])
+            left_out = True
+    return left_out
+
+
+@kernel
+def lies_below(model: Any, data: Any, edge: Any, floor: Any) -> bool:
+    """Whether the geom that a moving body touches lies, with its bounding box, below another
+    contact of the body, which has another normal."""
+    bodies, below = integers(model.geom_bodyid, model.ngeom), False
+    boxes = reals(model.geom_aabb, (model.ngeom, 6))
+    xpos = reals(data.geom_xpos, (model.ngeom, 3))
+    xmat = reals(data.geom_xmat, (model.ngeom, 3, 3))
+    one, other = bodies[floor.geoms[0]], bodies[floor.geoms[1]]
+    for side in range(2):
+        body, piece, top = bodies[edge.geoms[side]], edge.geoms[1 - side], 0.0
+        if body == 0 or (body != one and body != other):
+            continue
+        up = 1.0 if body == other else -1.0
+        for j in range(3):
+            top += up * floor.frame[0, j] * (xpos[piece, j] - floor.pos[j])
+        for axis in range(3):
+            along = 0.0
+            for j in range(3):
+                along += up * floor.frame[0, j] * xmat[piece, j, axis]
+            top += along * boxes[piece, axis] + abs(along) * boxes[piece, 3 + axis]
+        if top > EDGE * smaller_radius(model, edge):
+            return False
+        below = True
+    return bool(below and abs(cosine(edge, floor)) < 1 - ALIGNED)
+
+
+@kernel
+def cosine(one: Any, other: Any) -> float:
+    """The cosine of the angle between the normals of two contacts."""
+    product = 0.0
+    for j in range(3):
+        product += one.frame[0, j] * other.frame[0, j]
+    return product
 
 
 @kernel

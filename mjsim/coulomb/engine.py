@@ -81,7 +81,7 @@ MJ_OPTION = _only(structure("mjOption"), "timestep", "gravity", "cone", "solver"
 MJ_MODEL = _only(
     structure("mjModel"),
     *("nv", "nbody", "njnt", "ngeom", "geom_rbound", "geom_bodyid"),
-    *("body_rootid", "body_mocapid"),
+    *("geom_aabb", "body_rootid", "body_mocapid"),
     *("nu", "jnt_type", "jnt_dofadr"),
     *("nC", "nD", "dof_parentid", "M_rownnz", "M_rowadr", "M_colind", "mapD2M"),
     opt=MJ_OPTION,

@@ -75,6 +75,9 @@ FLUSH = 1e-3
 """Part of how far points of contact move that counts there: those of flush faces shift by µm."""
 ALIGNED = 1e-3
 """By how much the cosine of the angle between normals of one face is less than 1, at most."""
+EDGE = 1e-3
+"""How high above a floor the edge of one of its pieces may stand, in units of the smaller radius,
+for what slides not to stop there."""
 NARROW = 1e-3
 """Square of the width of a face, in units of its length, below which its points lie on a line."""
 APART = 1e9

@@ -13,7 +13,7 @@ from typing import Any
 import mujoco
 
 from .compiling import kernel
-from .contacts import smaller_radius
+from .contacts import cosine, smaller_radius
 from .engine import integers, mj_factorM, mj_fwdActuation, mjd_smooth_vel, reals
 from .friction import shift
 from .memory import SLIDES, bodies_at, contacts_of, rows_of
@@ -136,11 +136,9 @@ def share_loads(model: Any, memory: Any) -> None:
 @kernel
 def same_face(model: Any, one: Any, other: Any) -> bool:
     """Whether two contacts are of the same bodies, with the same normal."""
-    bodies, cosine = integers(model.geom_bodyid, model.ngeom), 0.0
-    for j in range(3):
-        cosine += one.frame[0, j] * other.frame[0, j]
-    same = bodies[one.geoms[0]] == bodies[other.geoms[0]]
-    return bool(same and bodies[one.geoms[1]] == bodies[other.geoms[1]] and cosine > 1 - ALIGNED)
+    bodies = integers(model.geom_bodyid, model.ngeom)
+    same = bodies[one.geoms[0]] == bodies[other.geoms[0]] and cosine(one, other) > 1 - ALIGNED
+    return bool(same and bodies[one.geoms[1]] == bodies[other.geoms[1]])
 
 
 @kernel

@@ -13,6 +13,7 @@ from .contacts import (
     copy_jacobians,
     find,
     leave_added_points_out,
+    leave_inner_edges_out,
     match,
     nothing_moved,
     put_points_back,
@@ -119,6 +120,9 @@ def update_contacts(
     if match(model, data, memory) > memory.least:
         anew = put_points_back(model, data, memory)
     if anew or leave_added_points_out(model, data, memory):
+        find(model, data, memory)
+        match(model, data, memory)
+    if memory.law.rigid and leave_inner_edges_out(model, data, memory):
         find(model, data, memory)
         match(model, data, memory)
     copy_jacobians(model, data, memory)

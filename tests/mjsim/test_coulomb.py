@@ -6,6 +6,7 @@ times its speed. That rigid contacts roll, turn, land and bounce as they should 
 tests/compare/test_engines.py."""
 
 import contextlib
+import itertools
 import math
 from pathlib import Path
 
@@ -119,6 +120,24 @@ PLATE = '<geom type="box" size=".1 .1 .001" mass="1"/>'
 FEET = PLATE.replace("/>", ' contype="0" conaffinity="0"/>') + "".join(
     f'<geom size=".001" mass="0" pos="{x} {y} 0"/>' for x in (-0.1, 0.1) for y in (-0.1, 0.1)
 )
+
+
+def test_what_slides_over_the_seams_of_a_floor_stops_only_at_a_wall():
+    """With rigid contacts, which see the sides of tiles ahead; a wall stands on its tiles."""
+    tiles = "".join(
+        f'<geom type="box" size=".1 .1 .05" pos="{0.2 * i} {0.2 * j} -.05"/>'
+        for i, j in itertools.product(range(5), range(5))
+    )
+    wall = '<geom type="box" size=".1 1 .1" pos=".8 0 .1"/>'
+    model = world(f'{tiles}{wall}<body pos="-.02 .01 .05"><freejoint/>{BOX}</body>')
+    model.geom_friction[:, 0] = 0.3
+    data, law = mujoco.MjData(model), Coulomb(model, rigid=True)
+    data.qvel[:2] = 2.0, 1.0
+    law.step(data, 100)
+    slower = 1 - 0.3 * G * data.time / math.hypot(2, 1)
+    np.testing.assert_allclose(data.qvel[:2], [2 * slower, slower], rtol=1e-3)
+    law.step(data, 400)
+    assert data.qpos[0] == pytest.approx(0.65, abs=1e-4)
 
 
 @WAYS
