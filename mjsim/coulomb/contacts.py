@@ -2,8 +2,8 @@
 
 Each contact of the step before hands on its state, load and friction to the one that is now nearest
 to it on both bodies; friction turns with these, and what several hand on adds up. Colliders drop
-points of flat faces that still overlap, which are put back, and add some, which are left out like the
-seams of a floor.
+points of flat faces that still overlap, which are put back, and add some, which are left out like
+the seams of a floor.
 """
 
 from __future__ import annotations
