@@ -527,18 +527,17 @@ def leave_inner_edges_out(model: Any, data: Any, memory: Any) -> bool:
 
 @kernel
 def lies_below(model: Any, data: Any, edge: Any, floor: Any) -> bool:
-    """Whether the geom that a moving body touches lies, with its bounding box, below another
-    contact of the body, which has another normal."""
+    """Whether what a moving geom touches lies, with its bounding box, below another contact of the
+    geom, which has another normal. Geoms are convex: all of this one lies above."""
     bodies, below = integers(model.geom_bodyid, model.ngeom), False
     boxes = reals(model.geom_aabb, (model.ngeom, 6))
     xpos = reals(data.geom_xpos, (model.ngeom, 3))
     xmat = reals(data.geom_xmat, (model.ngeom, 3, 3))
-    one, other = bodies[floor.geoms[0]], bodies[floor.geoms[1]]
     for side in range(2):
-        body, piece, top = bodies[edge.geoms[side]], edge.geoms[1 - side], 0.0
-        if body == 0 or (body != one and body != other):
+        moving, piece, top = edge.geoms[side], edge.geoms[1 - side], 0.0
+        if bodies[moving] == 0 or (moving != floor.geoms[0] and moving != floor.geoms[1]):
             continue
-        up = 1.0 if body == other else -1.0
+        up = 1.0 if moving == floor.geoms[1] else -1.0
         for j in range(3):
             top += up * floor.frame[0, j] * (xpos[piece, j] - floor.pos[j])
         for axis in range(3):

@@ -140,6 +140,22 @@ def test_what_slides_over_the_seams_of_a_floor_stops_only_at_a_wall():
     assert data.qpos[0] == pytest.approx(0.65, abs=1e-4)
 
 
+def test_what_hangs_below_the_floor_on_which_a_body_slides_stops_at_a_wall():
+    """The wall lies below the contacts that bear the body, but not all of the body lies above."""
+    high = '<geom type="box" size="2 .3 .1" pos="0 0 .8"/>'
+    walls = "".join(f'<geom type="box" size=".05 .1 .25" pos="1 {y} .25"/>' for y in (-0.5, 0.5))
+    legs = "".join(
+        f'<geom type="capsule" fromto=".15 {y} 0 .15 {y} -.7" size=".05"/>' for y in (-0.5, 0.5)
+    )
+    arm = '<geom type="box" size=".2 .6 .05"/>'
+    model = world(f'{high}{walls}<body pos="0 0 .95"><freejoint/>{arm}{legs}</body>')
+    model.geom_friction[:, 0] = 0.01
+    data = mujoco.MjData(model)
+    data.qvel[0] = 1.0
+    Coulomb(model, rigid=True).step(data, 600)
+    assert 0.5 < data.qpos[0] < 0.8
+
+
 @WAYS
 @pytest.mark.parametrize("geom", [PLATE, FEET], ids=["plate", "feet"])
 def test_what_slides_and_spins_turns_as_far_as_its_corners_let_it(rigid, geom):
