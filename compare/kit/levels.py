@@ -120,7 +120,7 @@ AT_DEFAULT = replace(
     AT_QUICK, sections=7,
     settled_starts=tuple((how, _FLOWS) for how in _STARTS), settled_sharp=0.1,
     thresholds_width=1e-6, thresholds_fold=3e-4, thresholds_loose=1.0,
-    edge_flows=(0.1, 0.17, 0.26, 0.38, 0.6), edge_lines=5, edge_time=60.0,
+    edge_flows=(0.1, 0.17, 0.26, 0.38, 0.6), edge_lines=4, edge_time=60.0,
     plane_spread=160, plane_added=(60, 60, 60),
     hysteresis_hold=60.0, hysteresis_parts=4,
     slope_slipping=20,

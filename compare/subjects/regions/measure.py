@@ -15,6 +15,7 @@ where that is born.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -142,6 +143,8 @@ FAR_FROM_EDGE = 0.1
 """A long way, in two fifths of a run, divided by the distance of the attractors."""
 ARRIVED = 0.01
 """Distance at which a ball has arrived, divided likewise."""
+WIDTHS = 2 * math.sqrt(3)
+"""Most by which the places in two brackets of a width differ, in standard uncertainties of one."""
 CLOSING = (0.1, 0.17, 0.26, 0.38)
 """Flows, as parts of the way from omega_02 to omega_04, on the way to where the edge begins."""
 
@@ -289,11 +292,14 @@ class Edge:
     def further(self) -> Array:
         """How far lines beyond the last may move the crossing (8,).
 
-        Moves are taken to shrink as the last two did: together they are at least the last one, and
-        at most ten of its size; and no less than the distance from the crossing to the next line,
-        through the mean of the last two runs."""
+        Moves are taken to shrink as the last two did, but for what two brackets explain of a move:
+        together they are at least the last one, and at most ten of its size; and no less than the
+        distance from the crossing to the next line, through the mean of the last two runs. (What
+        brackets explain was taken for moves that go on until they were seen to be no more.)"""
+        assert self.bracket is not None
         *_, before, last = (0.0, *(float(np.linalg.norm(move[SLIP_XYZ])) for move in self.moves))
-        ratio = min(last / before, 0.9) if before else 0.0
+        sure = float(np.linalg.norm((self.bracket.place.uncertainty * self.line)[SLIP_XYZ]))
+        ratio = min(max(last - WIDTHS * sure, 0.0) / before, 0.9) if before else 0.0
         onward, roll = self.with_next_line(), self.p.R / self.p.r
         alike = np.array([1.0, 1.0, roll, 1.0, 1.0, 1.0, 1.0, 1.0])
         off, along = (onward.centre - self.crossing) * alike, onward.line * alike
