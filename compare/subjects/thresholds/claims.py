@@ -11,22 +11,26 @@ from scipy.optimize import brentq
 
 import analytic
 from analytic.bifurcation import diagram as bifurcation
-from analytic.mechanics import rolling_forces
+from analytic.mechanics import rolling_forces, roots
 from analytic.stationary import slipping_branch
 from compare.claim import Criterion, When, claim, criteria, given
 from compare.judge import theory
 from compare.kit.record import Measurement, Relation
 from compare.states import thresholds_of, value_in
 from model import Case, Parameters
+from model.arrays import Real
 
 _BY = "analytic.thresholds"
 SLIPPING = "floor force of settled slipping → 0"
 """How omega_02 is measured where slipping ends without a fold: a claim of its own."""
 
 
-def _threshold(
-    quantity: str, when: When = lambda m: m.at["by"] != SLIPPING, protocol: str = "thresholds"
-) -> Criterion:
+def _changes(m: Measurement) -> bool:
+    """Whether a threshold is measured where a ball changes its case."""
+    return m.at["by"] != SLIPPING
+
+
+def _threshold(quantity: str, when: When = _changes, protocol: str = "thresholds") -> Criterion:
     """A criterion on a threshold, which `analytic.thresholds` predicts."""
 
     def predict(m: Measurement) -> float:
@@ -82,12 +86,46 @@ def _holds(name: str) -> Iterator[Criterion]:
         )
 
 
+def _where_lasts(case: Case, p: Parameters, slow: float, fast: float) -> float:
+    """The flow between two at which a case begins or ends, with slip that dies out; rad s-1."""
+
+    def lasts(omega_0: Real) -> int:
+        found = analytic.stationary_solutions(p.replace(omega_0=float(omega_0)), (case,))
+        return 1 if any(s.exists and s.slip_stable for s in found) else -1
+
+    return float(roots.sign_change(lasts, slow, fast))
+
+
+def _flow_of_slipping(t: analytic.Thresholds, fastest: float) -> float:
+    """A flow between the ends of SS, rad s-1; on a smooth wall it has no end but the fastest."""
+    ends = t.omega_04, t.omega_02, fastest
+    return math.sqrt(t.omega_01 * next(end for end in ends if not math.isnan(end)))
+
+
+def _lasting(case: Case, quantity: str, when: When = _changes) -> Criterion:
+    """A criterion on a threshold, where a case begins or ends by its stationary solution."""
+
+    def predict(m: Measurement) -> float:
+        p = m.parameters.replace(omega_0=1.0)
+        unit = math.sqrt(p.g / p.R)
+        slow, fast = 0.01 * unit, 100 * unit
+        if case is Case.SS:  # it has two ends
+            middle = _flow_of_slipping(thresholds_of(m), fast)
+            slow, fast = (slow, middle) if quantity == "omega_01" else (middle, fast)
+        return theory(_where_lasts, case, p, slow, fast)
+
+    by = f"analytic.stationary_solutions: {case.name}"
+    return _measured(quantity, predict, when=when, by=by)
+
+
 CLAIMS = (
     claim(
         "table-5-P3",
         "Table 5, P3",
         "At ω₀₁ two-point rolling gives way to slipping at both points, whose slip begins at zero.",
         _threshold("omega_01"),
+        _lasting(Case.RR, "omega_01"),
+        _lasting(Case.SS, "omega_01"),
     ),
     claim(
         "rolling-holds",
@@ -101,6 +139,8 @@ CLAIMS = (
         "Table 5, P2",
         "At ω₀₂ the sinking state (NS) and the state carried by the wall (NR) meet.",
         _threshold("omega_02"),
+        _lasting(Case.NS, "omega_02"),
+        _lasting(Case.NR, "omega_02"),
     ),
     claim(
         "table-5-NF2",
@@ -115,6 +155,7 @@ CLAIMS = (
         "With η > j two-point rolling ends at ω₀₃: below, a ball pressed to the floor settles in "
         "it; above, it leaves it.",
         _threshold("omega_03"),
+        _lasting(Case.RR, "omega_03"),
         _measured("lifts", lambda m: math.isnan(thresholds_of(m).omega_01), by=f"{_BY}: omega_01"),
     ),
     claim(
@@ -122,6 +163,7 @@ CLAIMS = (
         "Table 5, F",
         "The stable branch of slipping at both points ends in a fold at ω₀₄, where there is one.",
         _threshold("omega_04"),
+        _lasting(Case.SS, "omega_04"),
         _measured(
             "folds", lambda m: math.isfinite(thresholds_of(m).omega_04), by=f"{_BY}: omega_04"
         ),
@@ -152,6 +194,7 @@ CLAIMS = (
             by="diagram.critical_drag",
         ),
         _threshold("omega_02", given(by=SLIPPING)),
+        _lasting(Case.SS, "omega_02", given(by=SLIPPING)),
     ),
     claim(
         "one-fold",
