@@ -173,6 +173,13 @@ def _where_all_meet(m: Measurement) -> float:
     return bifurcation.double_points(m.parameters)[-1].omega_0
 
 
+def _slip_along_alpha(m: Measurement) -> float:
+    """A component of slip of SS by the speed and the direction alpha of its solution, rad s-1."""
+    solution = solution_of(m)
+    part = math.sin if m.quantity == "slip_x" else math.cos
+    return math.hypot(solution.state.slip_x, solution.state.slip_z) * part(solution.alpha)
+
+
 _ROLLS, _SLIPS, _LIFTED, _SINKS = (is_in(each) for each in (Case.RR, Case.SS, Case.NR, Case.NS))
 _LEANS = all_of(_LIFTED, from_floor)
 _STATE = (*MOTION, *FORCES)
@@ -248,6 +255,13 @@ CLAIMS = (
             _slip_on_branch,
             when=_SLIPS,
             by="slipping_branch.states",
+        ),
+        *criteria(
+            "settled",
+            ("slip_z", "slip_x"),
+            _slip_along_alpha,
+            when=_SLIPS,
+            by="analytic.stable_solutions: alpha",
         ),
     ),
     claim(
