@@ -10,6 +10,7 @@ import numpy as np
 
 import analytic
 from analytic.flowmeter import design
+from analytic.flowmeter.characteristic import End
 from compare.claim import Criterion, Text, When, all_of, claim, criteria, given
 from compare.judge import integrated, simulated, theory
 from compare.kit.record import Measurement, state
@@ -62,6 +63,11 @@ def _only_rolling(m: Measurement) -> float:
 def _range(m: Measurement) -> float:
     """The flow up to which the meter can be used, rad s-1."""
     return analytic.operating_range(m.parameters)
+
+
+def _ends_unloading(m: Measurement) -> bool:
+    """Whether unloading ends the range of a meter, of which the floor then lets go."""
+    return analytic.operating_limit(m.parameters).end is End.UNLOADING
 
 
 def _unloads(m: Measurement) -> float:
@@ -245,6 +251,13 @@ CLAIMS = (
         ),
         Criterion("settled", "omega_c", _reads_flow, when=_does_not_sink),
         *(Criterion("thresholds", end, _range, when=first) for end, first in _ENDS_OF_RANGES),
+        Criterion(
+            "thresholds",
+            "lifts",
+            _ends_unloading,
+            when=lambda m: _range(m) > 0,
+            by="analytic.operating_limit",
+        ),
     ),
     claim(
         "unloading-limit",
