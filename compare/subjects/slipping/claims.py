@@ -77,6 +77,13 @@ def _by_forces(m: Measurement) -> float:
     )
 
 
+def _neutral(m: Measurement) -> float:
+    """gamma of a case that is neutral with respect to slipping, 0; LookupError of another."""
+    if slip_stability.stability(_arrow(m)[0], m.parameters) is not SlipStability.NEUTRAL:
+        raise LookupError("slip grows or dies out")
+    return 0.0
+
+
 def _steepest(m: Measurement) -> float:
     """beta_1 (58) in the measured state, rad."""
     return float(slip_bounds.steepest_nr(_state(m), m.parameters))
@@ -290,6 +297,7 @@ CLAIMS = (
         "unstable beyond (on the wall alone the other way round). At rest slip at the wall neither "
         "grows nor dies out.",
         _gammas(_gamma, when=_along(_RR_RS, "rest"), by="slip_stability.gamma"),
+        _gammas(_neutral, when=_along(_RR_RS, "rest"), by=_STABILITY),
         _neutral_flow("omega_01", Case.RR, "onset of slip"),
         _neutral_flow("omega_02", Case.NR, "onset of sliding on the wall"),
         _neutral_flow("omega_03", Case.RR, "loss of the floor"),
