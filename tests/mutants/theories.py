@@ -143,6 +143,11 @@ def _exist(right: Function, p: Parameters) -> list[Any]:
     return [replace(s, exists=True) for s in right(p)]
 
 
+def _end_early(right: Function, p: Parameters) -> list[Any]:
+    """Solutions only where there are some in a flow 1 % faster, too."""
+    return right(p) if right(p.replace(omega_0=1.01 * p.omega_0)) else []
+
+
 def _without_drag_on_y(
     right: Function, case: Case, x: Any, f: Any, p: Parameters, omega_0: Any
 ) -> Any:
@@ -269,11 +274,17 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "SS of a ball with 1 % more inertia": other(j=1.01),
         "SS in a fluid with 1 % more drag": other(c=1.01),
         "SS lags as under Stokes' drag": given(_by_stokes),
+        "α of SS with the wrong sign": of_case(None, fields(alpha=times(-1.0))),
+        "SS ends 1 % before the fold": _end_early,
     },
-    "stationary.solutions._ns": {"NS sinks as under Stokes' drag": given(_by_stokes)},
+    "stationary.solutions._ns": {
+        "NS sinks as under Stokes' drag": given(_by_stokes),
+        "NS ends 1 % before ω₀₂": _end_early,
+    },
     "stationary.solutions._lifting_spin": {"spin of SR and NR with 1 % more weight": other(g=1.01)},
     "stationary.solutions._wall_carries": {
-        "(35) with the sign as printed": answer(lambda carries: not carries)
+        "(35) with the sign as printed": answer(lambda carries: not carries),
+        "the wall carries a ball from 5 % more flow on": other(omega_0=1 / 1.05),
     },
     "stationary.solutions.stable_solutions": {
         "a ball on the wall is no attractor": without(Case.NR)
@@ -395,7 +406,8 @@ _FAULTS: dict[str, dict[str, Fault]] = {
         "Definitions 1-3 with 1 % more wall friction": other(eta=1.01),
     },
     "slipping.slip_stability._by_sign": {
-        "what is driven is held": lambda right, drive, hold: right(hold, drive)
+        "what is driven is held": lambda right, drive, hold: right(hold, drive),
+        "nothing is neutral": lambda right, drive, hold: right(drive, hold + 1e-9),
     },
     "slipping.slip_bounds._nr_terms": {"(56)-(59) with 2 % more inertia": other(j=1.02)},
     "slipping.slip_bounds.nr_to_ns": {"(61) with 3 % more wall friction": other(eta=1.03)},
@@ -434,6 +446,9 @@ _FAULTS: dict[str, dict[str, Fault]] = {
     "mechanics.drag.reynolds": {"Reynolds' number by the radius": scaled(0.5)},
     "mechanics.drag.ramp_lag": {"a fall begins 2 % fast": scaled(1.02)},
     # The flowmeter, section 5.3
+    "flowmeter.characteristic.operating_limit": {
+        "slip ends the range of every meter": answer(fields(end=lambda end: type(end).SLIP))
+    },
     "flowmeter.characteristic.operating_range": {
         "operating range up to ω₀₂": lambda right, p: bifurcation.thresholds(p).omega_02,
     },
