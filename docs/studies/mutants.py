@@ -38,6 +38,8 @@ OTHERS = (
     ("by others, new", 55, 29, 1, 1, 24),
     ("by a referee, `tests/mutants/referee.py` of aa5b007", 80, 67, 0, 1, 12),
     ("by a second one, `tests/mutants/umpire.py` of ca3cac1", 80, 63, 0, 3, 14),
+    ("by a third one, `tests/mutants/arbiter.py` of cf300bf, 60 first", 60, 56, 0, 0, 4),
+    ("by a third one, subtler, the same file", 73, 55, 0, 2, 16),
 )
 """Lists of wrong theories that others wrote, each judged once, at quick, before anything was
 changed for it: faults, and how many were noticed in which way of `KINDS`."""
