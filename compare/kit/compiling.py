@@ -78,7 +78,7 @@ def now() -> str:
         for pipe in tuple(workers):
             while pipe.poll():
                 _heard.elsewhere, _heard.at = pipe.recv(), time.monotonic()
-        fresh = time.monotonic() - _heard.at < FORGOTTEN
+        fresh = 0 <= time.monotonic() - _heard.at < FORGOTTEN
     return here() or (_heard.elsewhere if fresh else "")
 
 

@@ -3,6 +3,7 @@ nothing when quiet."""
 
 from __future__ import annotations
 
+import math
 import sys
 import threading
 import time
@@ -49,8 +50,8 @@ class _Pace:
     """How fast something goes, by what was last said of it."""
 
     def __init__(self) -> None:
-        self._began = self._said = time.monotonic()
-        self._before, self._done, self._total = -1, 0, 0
+        self._first = self._began = self._said = time.monotonic()
+        self._at_first, self._before, self._done, self._total = 0, -1, 0, 0
 
     def note(self, done: int, total: int) -> bool:
         """Note how much is done; return whether that is the first to go by.
@@ -62,11 +63,12 @@ class _Pace:
         if (done, total) != (self._done, self._total):
             self._said, self._done, self._total = time.monotonic(), done, total
         if first:
-            self._began, self._before = time.monotonic(), done
+            self._first = self._began = time.monotonic()
+            self._at_first = self._before = done
         return first
 
     def look(self) -> str:
-        """What is said of compiling, now and then: nothing that is done meanwhile is a measure."""
+        """What is said of compiling, now and then: what is done meanwhile is a measure by half."""
         if said := compiling.now():
             self._began = self._said = time.monotonic()
             self._before = self._done
@@ -75,10 +77,13 @@ class _Pace:
     def left(self) -> float:
         """Seconds that are left; 0 where nobody knows.
 
-        While nothing is said, that is no sign that it is slow."""
+        While nothing is said, that is no sign that it is slow. Where numba has compiled others went
+        on: a part takes longer than since then, and less than in all."""
         if not self._done > self._before >= 0:
             return 0.0
-        a_part = (self._said - self._began) / (self._done - self._before)
+        of_late = (self._said - self._began) / (self._done - self._before)
+        in_all = (self._said - self._first) / (self._done - self._at_first)
+        a_part = math.sqrt(of_late * in_all)
         left = a_part * (self._total - self._done) - (time.monotonic() - self._said)
         return max(left, 0.0)
 
