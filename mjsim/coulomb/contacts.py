@@ -529,6 +529,8 @@ def leave_inner_edges_out(model: Any, data: Any, memory: Any) -> bool:
 def lies_below(model: Any, data: Any, edge: Any, floor: Any) -> bool:
     """Whether what a moving geom touches lies, with its bounding box, below another contact of the
     geom, which has another normal. Geoms are convex: all of this one lies above."""
+    if abs(cosine(edge, floor)) >= 1 - ALIGNED:
+        return False
     bodies, below = integers(model.geom_bodyid, model.ngeom), False
     boxes = reals(model.geom_aabb, (model.ngeom, 6))
     xpos = reals(data.geom_xpos, (model.ngeom, 3))
@@ -548,7 +550,7 @@ def lies_below(model: Any, data: Any, edge: Any, floor: Any) -> bool:
         if top > EDGE * smaller_radius(model, edge):
             return False
         below = True
-    return bool(below and abs(cosine(edge, floor)) < 1 - ALIGNED)
+    return below
 
 
 @kernel

@@ -76,7 +76,7 @@ def velocity_to_ask_for(model: Any, memory: Any, contact: Any, estimate: float) 
 
 @kernel
 def bounced(model: Any, data: Any, memory: Any, contact: Any, goal: float) -> float:
-    """Normal velocity that a contact asks for which may bounce, m s-1; `goal` if it doesn't.
+    """Normal velocity that a contact which may bounce asks for, m s-1; `goal` if it doesn't bounce.
 
     What an impact makes touch, or touch again, bounces in the next step.
     """

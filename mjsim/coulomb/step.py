@@ -84,6 +84,8 @@ def law_of_a_step(m: int, d: int, at: int) -> None:
     if data.ncon == 0 and not rigid:  # nothing touches: all is MuJoCo's own
         forget_contacts(memory)
         return
+    memory.gravity = size_of_gravity(model)
+    memory.enough = memory.law.share * memory.gravity
     if memory.braking:
         add_dampers(model, data, memory)
     moved = not known or not nothing_moved(model, data, memory)
@@ -93,8 +95,6 @@ def law_of_a_step(m: int, d: int, at: int) -> None:
     memory.pending = memory.contacts + memory.dry > 0
     if not memory.pending:
         return
-    memory.gravity = size_of_gravity(model)
-    memory.enough = memory.law.share * memory.gravity
     find_references(model, data, memory, since if known and moved else 0.0)
     if predict_slip(model, data, memory) or not known:
         solve(model, data, memory, known)
