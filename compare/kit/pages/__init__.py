@@ -81,6 +81,7 @@ _SIGNS_OF_PAGES = {
     r"\^\(?([\d/]+)\)?": r"<sup>\1</sup>",  # ρ^(2/3)
     r"(?<= )-(?= )|(?<![\w).])-(?=\d)": "−",
 }
+"""What pages write otherwise than terminals, JSON and sources do."""
 
 
 def typeset(text: str) -> str:

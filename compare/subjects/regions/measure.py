@@ -289,16 +289,21 @@ class Edge:
         return Search(around, task, partial(ends_slipping, edge=self), width)
 
     @property
+    def by_bracket(self) -> Array:
+        """Standard uncertainty of the crossing (8,) by the last bracket."""
+        assert self.bracket is not None
+        return np.asarray(self.bracket.place.uncertainty * self.line)
+
+    @property
     def further(self) -> Array:
         """How far lines beyond the last may move the crossing (8,).
 
         Moves are taken to shrink as the last two did, but for what two brackets explain of a move:
         together they are at least the last one, and at most ten of its size; and no less than the
-        distance from the crossing to the next line, through the mean of the last two runs. (What
-        brackets explain was taken for moves that go on until they were seen to be no more.)"""
-        assert self.bracket is not None
+        distance from the crossing to the next line, through the mean of the last two runs. (Chosen
+        after moves had been seen that were no longer than brackets are wide.)"""
         *_, before, last = (0.0, *(float(np.linalg.norm(move[SLIP_XYZ])) for move in self.moves))
-        sure = float(np.linalg.norm((self.bracket.place.uncertainty * self.line)[SLIP_XYZ]))
+        sure = float(np.linalg.norm(self.by_bracket[SLIP_XYZ]))
         ratio = min(max(last - WIDTHS * sure, 0.0) / before, 0.9) if before else 0.0
         onward, roll = self.with_next_line(), self.p.R / self.p.r
         alike = np.array([1.0, 1.0, roll, 1.0, 1.0, 1.0, 1.0, 1.0])
@@ -309,16 +314,15 @@ class Edge:
     @property
     def uncertainty(self) -> Array:
         """Standard uncertainty of the crossing (8,), by the last bracket and further lines."""
-        assert self.bracket is not None
-        return np.asarray(np.hypot(self.bracket.place.uncertainty * self.line, self.further))
+        return np.asarray(np.hypot(self.by_bracket, self.further))
 
     def estimate(self, value: float, uncertainty: float) -> Estimate:
         """A number of the state at the crossing, by the causes of its uncertainty."""
         assert self.bracket is not None
-        place, further = self.bracket.place, estimate(0.0, further_lines=1.0)
-        moves = place.uncertainty * self.line, self.further
+        causes = self.bracket.place, estimate(0.0, further_lines=1.0)
+        moves = self.by_bracket, self.further
         sizes = [float(np.linalg.norm(move[SLIP_XYZ])) for move in moves]
-        return estimate(value, edge=uncertainty).told_apart("edge", (place, further), sizes)
+        return estimate(value, edge=uncertainty).told_apart("edge", causes, sizes)
 
     def rows(self) -> Measured:
         """Measurements of the state: omega_c, slips and the spin on the wall."""
