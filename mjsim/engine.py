@@ -33,7 +33,7 @@ from model import (
 from model.arrays import Array
 from model.errors import check_type
 from model.kinematics import UNITS, VARIABLES, check_place
-from model.parameters import Range, check_number
+from model.parameters import POSITIVE, Range, check_number
 
 EVENT_TIMES = "located between the time steps; what jumps only to the step"
 """How exact events are, as files say."""
@@ -90,15 +90,15 @@ class Run:
         self._p, self._x0, self._theta_0 = p, State.one(x0), check_number("theta_0", theta_0, "rad")
         self._progress = progress or (lambda done: None)
         self._timestep = self._settings.timestep
-        self._interval, self._count = sampling(t_end, self._timestep, sample_interval)
-        check_timestep(self._timestep, p, self._flow, t_end, self._x0)
-        check_start(self._x0, p, self._settings)
+        given = p, self._x0, t_end, self._flow, self._settings, sample_interval
+        self._interval, self._count = check_run(*given)
         self._model, mjcf = scene.build(p, self._settings)
         shown = dataclasses.asdict(self._settings) | {
             "t_end": float(t_end), "sample_interval": self._interval * self._timestep,
             "x0": list(self._x0), "theta_0": self._theta_0, "event_times": EVENT_TIMES,
         }  # fmt: skip
-        self.header = Header("mujoco", p, self._flow, shown, mjcf)
+        name = "mujoco" if isinstance(self._settings, RigidContacts) else "mujoco-plain"
+        self.header = Header(name, p, self._flow, shown, mjcf)
         """Where the trajectory comes from; a failure appears here."""
         self._classifier = Classifier(
             p, self._timestep, self._settings.midpoint, self._settings.dead_band
@@ -154,9 +154,18 @@ class Run:
         return block
 
 
-def check_start(x: State, p: Parameters, settings: ContactModel) -> None:
-    """`check_place`, but a run may go on where another one ended, and a warning if friction at both
-    contacts makes soft ones chatter."""
+def check_run(
+    p: Parameters,
+    x0: State,
+    t_end: float,
+    flow: Flow,
+    settings: ContactModel,
+    sample_interval: float | None,
+) -> tuple[int, int]:
+    """`InputError` for a run that can't begin; a warning if friction at both contacts makes soft
+    ones chatter. Returns `sampling`.
+
+    A run may go on where another one ended, a little below the floor."""
     if isinstance(settings, ContactSettings) and settings.contact_decay(p.mu, p.eta) > 1:
         warnings.warn(
             f"with mu = {p.mu:g} and eta = {p.eta:g} a ball that slips at both contacts chatters "
@@ -164,11 +173,14 @@ def check_start(x: State, p: Parameters, settings: ContactModel) -> None:
             "ContactSettings.suited gives slower contacts",
             stacklevel=4,
         )
-    check_place(x, p, max(settings.touching(p.g), DEEP * p.R))
+    check_timestep(settings.timestep, p, flow, t_end, x0)
+    check_place(x0, p, max(settings.touching(p.g), DEEP * p.R))
+    return sampling(t_end, settings.timestep, sample_interval)
 
 
 def check_timestep(timestep: float, p: Parameters, flow: Flow, t_end: float, x0: State) -> None:
     """`time_scales.check_timestep` with the drag of these engines."""
+    check_number("t_end", t_end, "s", POSITIVE)
     ball = BallConstants.of(p)
     time_scales.check_timestep(
         timestep, p, flow, t_end, lambda speed: resistance(speed, 0.0, 0.0, ball) / p.m, x0

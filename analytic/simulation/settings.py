@@ -65,6 +65,15 @@ class Settings:
             check_number("timestep", self.timestep, "s", POSITIVE)
 
 
+def check_run(p: Parameters, flow: Flow, t_end: float, x0: State, settings: Settings) -> None:
+    """Raise `InputError` for a run that can't begin, or is too long to be computed."""
+    start_state(x0, p, settings)
+    check_duration(p, flow, t_end, x0)
+    if settings.timestep is not None:
+        law = partial(drag.coefficient, p=p)
+        time_scales.check_timestep(settings.timestep, p, flow, t_end, law, x0)
+
+
 def check_duration(p: Parameters, flow: Flow, t_end: float, x0: State) -> None:
     """Raise `InputError` if a run in a huge flow is too long to be computed.
 

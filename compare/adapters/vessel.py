@@ -82,6 +82,13 @@ class Vessel(Scene):
         return float(-mc * w_x), float(-mc * w_y), float(-mc * v_z)
 
 
+def check_run(task: Any) -> tuple[int, int]:
+    """`InputError` for a task that can't begin; else steps between samples, and their number."""
+    check_timestep(task.settings.timestep, task.parameters, task.fluid, task.t_end, task.x0)
+    check_place(task.x0, task.parameters, task.parameters.r / 10)
+    return sampling(task.t_end, task.settings.timestep, task.sample_interval)
+
+
 def simulate(
     library: Library, member: str, task: Any, progress: Callable[[float], None]
 ) -> Trajectory:
@@ -98,10 +105,8 @@ def simulate(
         If the library is not installed, an argument out of range, or the time step too large
         for the problem."""
     p, flow, t_end, h = task.parameters, task.fluid, task.t_end, task.settings.timestep
-    every, count = sampling(t_end, h, task.sample_interval)
-    x = State.one(task.x0)
-    check_timestep(h, p, flow, t_end, x)
-    check_place(x, p, p.r / 10)
+    x: State = task.x0
+    every, count = check_run(task)
     total, failure = (count - 1) * every + 1, ""  # of the last sample only forces are needed
     with closing(library.load(member)) as engine:
         try:

@@ -26,6 +26,7 @@ from model import InputError, Parameters, State, Trajectory
 from model.arrays import Array
 from model.files import write_text
 from model.kinematics import UNITS, VARIABLES
+from model.parameters import Range, check_number
 
 
 def run(args: argparse.Namespace) -> int:
@@ -75,6 +76,9 @@ def _attractors(
     """The attractors of a set of parameters: by theory, or by the runs of another engine."""
 
     def simulate(p: Parameters, x0s: Array, duration: float, interval: float) -> list[Trajectory]:
+        step = running.settings(args, p).timestep or 0.0
+        densely = "to sample these motions densely enough it"
+        check_number("timestep", step, "s", Range(high=interval), densely)
         lasting = {"t_end": duration, "sample_interval": interval}
         return [carry_out(running.task(args, p, x0=State.of(x0), **lasting)) for x0 in x0s]
 

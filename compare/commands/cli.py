@@ -72,7 +72,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         return _run(sys.argv[1:] if argv is None else argv, args)
     except InputError as error:
-        return _ended(2, f"error: {_brief(str(error))}")
+        named = re.sub(r"^t_end\b", "time", str(error))  # as the option is called
+        return _ended(2, f"error: {_brief(named)}")
     except SimulationError as error:
         return _ended(1, str(error))
     except BrokenPipeError:  # `program` sees to it
@@ -143,7 +144,7 @@ def _run(argv: Sequence[str], args: argparse.Namespace) -> int:
     telling = nullcontext(lambda done: None) if quiet else waiting.told(words[0])
     with (
         warnings.catch_warnings(),
-        options.no_empty_directories(args),
+        options.nothing_left(args),
         signals.raised(),
         telling as args.tell,
     ):

@@ -10,6 +10,7 @@ import os
 import re
 import shutil
 import sys
+import traceback
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -271,17 +272,30 @@ def own_set(args: argparse.Namespace) -> dict[str, Parameters]:
     return {args.set: Parameters.named(args.set)} if args.set else {}
 
 
+NOTES = {"sweep.json", "summary.json"}
+"""Files that say what a directory is to hold: alone they are worth nothing."""
+
+
 @contextmanager
-def no_empty_directories(args: argparse.Namespace) -> Iterator[None]:
-    """A context after which empty directories that a command made for its output are removed if it
-    failed."""
+def nothing_left(args: argparse.Namespace) -> Iterator[None]:
+    """A context after which, if a command failed, directories are removed that it made for its
+    output, and notes in one that was empty or isn't there, if they hold nothing else."""
     output: Path | None = getattr(args, "output", None)
     new = [each for each in (output, *output.parents) if not each.exists()] if output else []
+    filled = output is None or output.is_file() or (output.is_dir() and any(output.iterdir()))
     try:
         yield
-    except BaseException:
-        inner = (each for each in new[0].rglob("*") if each.is_dir()) if new else ()
-        for each in [*sorted(inner, reverse=True), *new]:
+    except BaseException as error:
+        traceback.clear_frames(error.__traceback__)  # which may hold the last handles of files
+        inner = []
+        if output and not filled:
+            with suppress(OSError):  # a library holds all handles
+                inner = sorted(output.rglob("*"), reverse=True)
+        files = [each for each in inner if not each.is_dir()]
+        if {each.name for each in files} <= NOTES:
+            for each in files:
+                each.unlink()
+        for each in [*inner, *new]:
             with suppress(OSError):  # it holds something, or was never made
                 each.rmdir()
         raise

@@ -53,17 +53,14 @@ def settings(args: argparse.Namespace, p: Parameters) -> AnySettings:
 
 def task(args: argparse.Namespace, p: Parameters, **more: Any) -> Task:
     """The run of a ball that the options describe."""
-    args.engine.check_set(p)
-    chosen = settings(args, p)
-    step = getattr(chosen, "timestep", None) or 0.0
-    check_number("time", args.time or step, "s", Range(step), "to hold a time step it")
-    given = {"x0": start(args), "t_end": args.time, "settings": chosen} | more
-    if interval := getattr(args, "sample_interval", None):
-        within = Range(step, given["t_end"])
-        given["sample_interval"] = check_number(
-            "sample_interval", interval, "s", within, "within this run it"
-        )
-    return Task(engine=args.engine.name, parameters=p, **given)
+    chosen, asked = settings(args, p), getattr(args, "sample_interval", None)
+    given = {"x0": start(args), "t_end": args.time, "settings": chosen, "sample_interval": asked}
+    made = Task(engine=args.engine.name, parameters=p, **given | more)
+    made.check()
+    if asked:
+        within = Range(high=made.t_end)
+        check_number("sample_interval", asked, "s", within, "within this run it")
+    return made
 
 
 def workers(args: argparse.Namespace) -> Workers:

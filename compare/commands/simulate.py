@@ -7,6 +7,7 @@ import dataclasses
 import json
 import sys
 import tempfile
+from contextlib import nullcontext, suppress
 from pathlib import Path
 
 from compare.commands import options, running, signals
@@ -55,14 +56,16 @@ def run(args: argparse.Namespace) -> int:
         if as_table:
             columns = motions.labelled(storage.load(path))
             table.write(kept, columns, progress.part(args.tell, share, 1))
-        if failure:  # now, since a signal may come before all else is said
-            where = f"its samples so far are kept in {kept}"
-            where = where if args.output else "nothing is kept without --output"
-            print(f"dualball: the simulation {failure}; {where}", file=sys.stderr)
-        about = motions.describe(path)
-        options.show(about, args.json, motions.table(about))
-        if args.output and not failure and not args.json:
-            print(f"written to {args.output}")
+        # what ended the run may have been that nobody reads any more
+        with suppress(OSError) if heard else nullcontext():
+            if failure:  # now, since a signal may come before all else is said
+                where = f"its samples so far are kept in {kept}"
+                where = where if args.output else "nothing is kept without --output"
+                print(f"dualball: the simulation {failure}; {where}", file=sys.stderr)
+            about = motions.describe(path)
+            options.show(about, args.json, motions.table(about))
+            if args.output and not failure and not args.json:
+                print(f"written to {args.output}")
         return 128 + heard[0] if heard else 1 if failure else 0
 
 

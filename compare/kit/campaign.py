@@ -152,8 +152,8 @@ class Campaign:
 
     def __exit__(self, kind: type[BaseException] | None, *error: object) -> None:
         self.fleet.close(at_once=kind is not None)
+        self._owned.release()  # first: it needs no handle of a file, and there may be none
         remove_leftovers(self.directory)
-        self._owned.release()
         if self._made and not any(self.directory.iterdir()):
             self.directory.rmdir()
 

@@ -58,6 +58,8 @@ class Engine:
     """Options of the command line that `configure` takes."""
     configure: Callable[[Mapping[str, float], Parameters], AnySettings]
     """Settings of a user's run from such options; those not given have their defaults."""
+    check_run: Callable[[Any], object]
+    """`InputError` for a `compare.kit.tasks.Task` that can't begin, before it is carried out."""
     simulate: Simulate | None = None
     stream: Stream | None = None
     sources: tuple[str, ...]
@@ -137,6 +139,19 @@ def _unwarned(*given: Any, **more: Any) -> mjsim.Run:
         return mjsim.Run(*given, **more)
 
 
+def _check_stream(task: Any) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the run itself warns, once
+        mjsim.engine.check_run(
+            task.parameters, task.x0, task.t_end, task.fluid, task.settings, task.sample_interval
+        )
+
+
+def _check_theory(task: Any) -> None:
+    run = task.parameters, task.fluid, task.t_end, task.x0
+    analytic.simulation.settings.check_run(*run, task.settings)
+
+
 def _event_settings(given: Mapping[str, float], p: Parameters) -> analytic.Settings:
     """Settings of the event-driven simulation, whose tolerance is in place of a time step.
 
@@ -168,6 +183,7 @@ def _adapted(library: Library, marks: str) -> list[Engine]:
         settings=vessel.Settings,
         options=("timestep",),
         configure=lambda given, p: vessel.Settings(**given),
+        check_run=vessel.check_run,
         simulate=partial(vessel.simulate, library, "best"),
         sources=("model", "mjsim", "compare.adapters"),
         stands_on=("numpy",),
@@ -187,6 +203,7 @@ MUJOCO = Engine(
     settings=RigidContacts,
     options=("timestep",),
     configure=lambda given, p: RigidContacts(**given),
+    check_run=_check_stream,
     stream=mjsim.Run,
     sources=("model", "mjsim"),
     stands_on=("numpy", "mujoco"),
@@ -217,6 +234,7 @@ EVENT = Engine(
     settings=analytic.Settings,
     options=("rtol", "restitution"),
     configure=_event_settings,
+    check_run=_check_theory,
     simulate=partial(_theory, "event"),
     sources=("model", "analytic"),
     stands_on=("numpy", "scipy"),

@@ -62,6 +62,11 @@ class Task:
         """The engine of that name; `InputError` if there is none."""
         return engines.engine(self.engine)
 
+    def check(self) -> None:
+        """`InputError` for a run that can't begin, before others are carried out."""
+        self.simulator.check_set(self.parameters)
+        self.simulator.check_run(self)
+
     @property
     def fluid(self) -> Flow:
         """The flow, steady where `flow` is None."""

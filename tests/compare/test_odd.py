@@ -370,6 +370,11 @@ USERS = {  # a slice of some 330 lines that were drawn by hand: what must be in 
     "league --engine ./mine.py -o new": "./mine.py can't be used: write it as Python imports it",
     "league --engine os.path -o new": "posixpath has no function build nor step nor state",
     "cases nothing": "sphere-slides-rolls",
+    "attractors --engine mujoco --timestep 1": "timestep = 1 s is out of range",
+    "sweep --vary omega_0=1:400:3": "half of 1/(2 omega_0), the shortest time of the problem",
+    "sweep --vary omega_0=1,2 --start y=-1": "y = -1 m is out of range: to be above the floor",
+    "sweep --vary omega_0=1,2 --engine event --start v_h=-1": "v_h = -1 m s-1 is out of range",
+    "sweep --vary omega_0=1,2 --time 1e-4": "error: time = 0.0001 s is out of range",
 }
 TABLES = {
     "broken.toml": b"m = ",
@@ -505,6 +510,22 @@ def test_a_full_disk_leaves_nothing_behind(words, stocked, tmp_path, monkeypatch
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert {path: path.is_file() and path.read_bytes() for path in Path().rglob("*")} == before
+
+
+@pytest.mark.parametrize("there", [False, True])
+@pytest.mark.parametrize(
+    "words", ["sweep --vary eta=0.1,0.2 --workers 2", "validate --quick", "figures --figure fig-9"]
+)
+def test_too_few_handles_leave_nothing_behind(words, there, tmp_path):
+    if there:
+        (tmp_path / "new").mkdir()
+    limit = f"ulimit -n 16; exec {sys.executable} -m compare {words} -o new"
+    env = os.environ | {"PYTHONPATH": str(ROOT)}
+    given = {"cwd": tmp_path, "env": env, "capture_output": True, "text": True}
+    done = subprocess.run(["sh", "-c", limit], **given)
+    assert done.returncode == 2
+    assert done.stderr.splitlines()[-1].startswith("dualball: error: ")
+    assert [*tmp_path.rglob("*")] == [tmp_path / "new"] * there
 
 
 def test_runs_are_not_gathered_into_one_of_themselves(stocked, tmp_path, capsys):

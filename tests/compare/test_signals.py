@@ -4,6 +4,7 @@ is half written."""
 import contextlib
 import io
 import os
+import pty
 import shutil
 import signal
 import subprocess
@@ -18,7 +19,7 @@ import mjsim
 from compare.commands import cli, signals, simulate
 from compare.stops import SIGNALS
 from model import Parameters
-from tests.commands import COMMANDS, carried_out, python, started
+from tests.commands import COMMANDS, ROOT, carried_out, python, started
 
 P = Parameters.named("reference")
 LONG = {
@@ -111,6 +112,19 @@ def test_every_command_ends_at_any_moment(stocked, tmp_path, command, number, af
         for path in new
         if path.suffix == ".part" or (path.is_dir() and not any(path.iterdir()))
     ]
+
+
+@pytest.mark.parametrize("command", ["simulate", "sweep"])
+def test_a_terminal_that_goes_ends_a_command_as_its_signal_says(command, stocked, tmp_path):
+    here, (ours, theirs) = shutil.copytree(stocked, tmp_path / "here"), pty.openpty()
+    words = ["setsid", "--ctty", "--wait", sys.executable, "-m", "compare", command]
+    words += LONG[command].split()
+    given = {"env": os.environ | {"PYTHONPATH": str(ROOT)}, "cwd": here}
+    with subprocess.Popen(words, stdin=theirs, stdout=theirs, stderr=theirs, **given) as process:
+        os.close(theirs)
+        os.read(ours, 1)  # it has begun, and says so
+        os.close(ours)
+        assert process.wait(timeout=60) == 128 + signal.SIGHUP
 
 
 def test_what_a_stopped_run_leaves_is_told_whatever_comes_next(

@@ -24,8 +24,7 @@ from compare.kit.statistics import hops_on
 from compare.kit.sweep import Axis, check_size
 from compare.kit.tasks import Task
 from mjsim import RigidContacts
-from mjsim.engine import check_timestep
-from model import Case, Contact, Flow, InputError, Parameters, State
+from model import Case, Contact, InputError, Parameters, State
 from model.arrays import Array
 from model.files import reading_json, write_text
 from model.kinematics import VARIABLES
@@ -118,8 +117,6 @@ def basins(
     states = np.tile(base, (len(y), len(x), 1))
     states[..., VARIABLES.index(across.name)], states[..., VARIABLES.index(up.name)] = x, y[:, None]
     few = states[::coarse, ::coarse] if coarse else states[:0, :0]
-    for x0 in few.reshape(-1, len(VARIABLES)):  # a run that is refused would count as different
-        check_timestep(timestep, p, Flow.steady(p.omega_0), lasts, State.of(x0))
     tasks = [
         Task(
             engine=MUJOCO.name, parameters=p, x0=start_state(x0, p, Settings()), t_end=lasts,
@@ -127,6 +124,8 @@ def basins(
         )
         for x0 in few.reshape(-1, len(VARIABLES))
     ]  # fmt: skip
+    for task in tasks:  # one that is refused would count as different
+        task.check()
     fine, other = [], []
     threads = max(1, campaign.workers) if isinstance(campaign.workers, int) else None
     for k, row in enumerate(states):
