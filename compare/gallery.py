@@ -175,7 +175,8 @@ def write(
             drawing.save(figure, output / f"{name}.{suffix}")
         captions.append(f"{name}\n{each.title}. {caption}\n")
         yield name, ""
-    write_text(output / CAPTIONS, "\n".join(captions))
+    if captions:
+        write_text(output / CAPTIONS, "\n".join(captions))
 
 
 def pictures(

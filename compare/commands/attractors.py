@@ -34,6 +34,7 @@ def run(args: argparse.Namespace) -> int:
     axes, ways = map(Axis.several, (args.vary, args.follow))
     ranges = {way.name: way.ends for way in ways}
     sets = list(grid(options.parameters(args), axes))
+    options.warn_of_model(sets[0], sets[-1])
     rows = []
     for k, p in enumerate(sets):
 
@@ -74,6 +75,7 @@ def _attractors(
     args: argparse.Namespace, p: Parameters, tell: Callable[[float], None]
 ) -> list[Attractor]:
     """The attractors of a set of parameters: by theory, or by the runs of another engine."""
+    args.engine.check_set(p)
 
     def simulate(p: Parameters, x0s: Array, duration: float, interval: float) -> list[Trajectory]:
         step = running.settings(args, p).timestep or 0.0
@@ -218,6 +220,7 @@ def _largest(row: dict[str, Any]) -> float:
 def run_basins(args: argparse.Namespace) -> int:
     """Map the basins of attraction over a plane of starts, and show their shares."""
     p, start = options.parameters(args), running.start(args)
+    options.warn_of_model(p)
     units = dict(zip(VARIABLES, UNITS, strict=True))
     across, up = (Axis.parse(text, units, "state variable") for text in (args.across, args.up))
     for name in (across.name, up.name):

@@ -15,29 +15,29 @@ from model.parameters import check_names
 
 def figures(args: argparse.Namespace) -> int:
     """Draw every figure, or those named; one whose results are missing is told of."""
-    from analytic.flowmeter import real_fluid
     from compare import gallery as registry
     from compare import validation  # here, because drawing takes a second to load
-    from compare.kit.doubt import model_warning
     from compare.report import results
 
     if args.results:
         results.load(args.results)  # else there would be figures without what was measured
     if own := list(options.own_set(args).values()):
         chosen = registry.of_set(*own)
-        for doubt in model_warning(max(map(real_fluid.model_error, own))):
-            options.warn(doubt.removeprefix("Warning: "))
+        options.warn_of_model(*own)
     else:
         chosen = registry.of_results(validation.stored_evidence(args.results or Path("results")))
     if args.figure:
         check_names(args.figure, list(chosen), "figure")
         chosen = {name: chosen[name] for name in args.figure}
-    formats = list(dict.fromkeys(args.format or ["svg"]))
+    formats, gaps = list(dict.fromkeys(args.format or ["svg"])), list[str]()
     for k, (name, gap) in enumerate(registry.write(args.output, chosen, formats), 1):
         args.tell(k / len(chosen))
-        files = [name] if gap else [f"{name}.{suffix}" for suffix in formats]
-        for file in files:
-            print(f"{args.output / file}: {gap or 'written'}")
+        gaps += [f"{name}: {gap}"] if gap else []
+        for suffix in () if gap else formats:
+            print(f"{args.output / name}.{suffix}: written")
+    if args.figure and len(gaps) == len(chosen):
+        raise InputError("; ".join(gaps))
+    print("\n".join(gaps), end="\n" * bool(gaps))
     return 0
 
 

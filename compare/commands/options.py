@@ -265,6 +265,15 @@ def warn(said: str) -> None:
     print(f"dualball: warning: {said}", file=sys.stderr)
 
 
+def warn_of_model(*sets: Parameters) -> None:
+    """Warn where the paper's model leaves out too much of a fluid that is known."""
+    from analytic.flowmeter import real_fluid  # here, because help needs none of it
+    from compare.kit.doubt import model_warning
+
+    for doubt in model_warning(max(map(real_fluid.model_error, sets))):
+        warn(doubt.removeprefix("Warning: "))
+
+
 def own_set(args: argparse.Namespace) -> dict[str, Parameters]:
     """The parameter set that --set or --parameters names, by its name; {} if neither is given."""
     if args.parameters:

@@ -42,6 +42,7 @@ def run(args: argparse.Namespace) -> int:
             f"{args.flow} begins at t = {flow.start[0]:.10g} s, but the run, from 0 on, ends at "
             f"{args.time:g} s: shift its times, or give a longer --time"
         )
+    options.warn_of_model(p)
     task = running.task(args, p, flow=flow)
     with tempfile.TemporaryDirectory() as scratch:
         as_table = options.is_table(args.output)
@@ -76,6 +77,7 @@ def run_sweep(args: argparse.Namespace) -> int:
     save = collection.save_means if args.means_only else storage.save_batch
     with running.campaign(args, "sweep", batch=args.batch, save=save) as work:
         _refuse_another_sweep(args, p)
+        options.warn_of_model(tasks[0].parameters, tasks[-1].parameters)
         longest, slowest = steady.enough([each.parameters for each in tasks])
         if args.time < longest:
             options.warn(

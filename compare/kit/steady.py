@@ -23,6 +23,9 @@ FEWEST = 6
 """Samples of the last quarter of a run below which it has no mean."""
 DRIFT = 1e-3
 """Drift, relative to the orbit's angular velocity, from which a run hasn't settled."""
+AT_REST = 1e-6
+"""Angular velocity, rad/s, of which nobody asks what share it may change by: a turn in ten
+weeks."""
 SETS_ASKED = 64
 """Most sets of a sweep that are asked for their time constants: some .6 s."""
 
@@ -93,7 +96,7 @@ def in_words(flow: Flow, lasts: float, of: Mapping[str, float] | None) -> str:
         return "none: the flow still changes in the last quarter"
     off = float(share(np.array(mean), np.array(drift), flow(lasts)))
     digits = math.ceil(-math.log10(drift)) + 1 if 0 < drift < 1 else 1
-    shown = f"{mean:.{min(digits, 9)}f}" if drift else f"{mean:.9g}"
+    shown = f"{mean:z.{min(digits, 9)}f}" if drift else f"{mean:.9g}"
     said = f"omega_c = {shown} ± {drift:.1g} rad/s over the last quarter"
     if off > DRIFT:
         return f"not settled: {said}, which may change by {percent(off)} % yet"
@@ -107,5 +110,4 @@ def percent(share: float) -> str:
 
 def share(omega_c: Array, drift: Array, omega_0: Array) -> Array:
     """Drifts of omega_c relative to that, or to a hundredth of omega_0 if it is less."""
-    scale = np.maximum(np.abs(omega_c), np.abs(omega_0) / 100)
-    return np.divide(drift, scale, out=np.zeros_like(scale), where=scale > 0)
+    return drift / np.maximum(np.maximum(np.abs(omega_c), np.abs(omega_0) / 100), AT_REST)

@@ -186,6 +186,9 @@ def test_figures_of_a_set_of_ones_own(tmp_path, capsys, monkeypatch):
     said = told(capsys, f"figures --parameters {tmp_path / 'slick.toml'} -o {tmp_path / 'slick'}")
     assert said.count("has not all thresholds") >= 5
     assert said.count(": written") == 2  # Figs. 7 and 8
+    line = f"figures --parameters {tmp_path / 'slick.toml'} --figure fig-9 -o {tmp_path / 'none'}"
+    assert "fig-9: not drawn: a set with mu = 0, " in refused(capsys, line)
+    assert not (tmp_path / "none").exists()
 
 
 def test_functions_draw_into_axes_that_are_given_or_new():
