@@ -8,7 +8,7 @@ from pathlib import Path
 from types import FrameType
 from typing import NoReturn
 
-from compare.stops import SIGNALS
+from compare.campaign.stops import SIGNALS
 
 
 def main() -> NoReturn:

@@ -20,10 +20,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from analytic.flowmeter import real_fluid
-from compare import gallery
-from compare.kit import pages, style
-from compare.kit.doubt import model_warning
-from compare.kit.drawing import GapError
+from compare.figures import pages, style
+from compare.figures.drawing import GapError
+from compare.figures.validity import model_warning
+from compare.report import gallery
 from compare.subjects.attractors import figures as attractors
 from compare.subjects.attractors.basins import Basins
 from compare.subjects.flowmeter import figures as flowmeter

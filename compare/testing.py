@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 import analytic
-from compare.kit.scales import rotation_scale
-from compare.kit.steady import time_constant
+from analytic.stationary.solutions import time_constant
+from compare.method.scales import rotation_scale
 from model import Case, InputError, Parameters, StorageError, Trajectory, storage, table
 from model.arrays import Array
 from model.errors import check_type, suggestion

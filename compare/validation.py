@@ -11,23 +11,21 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
-from compare.assessment import full_verdict
-from compare.catalogue import CLAIMS, PROTOCOLS
-from compare.claim import Claim, Outcome, Verdict
-from compare.judge import forget, select
-from compare.kit import programme
-from compare.kit.campaign import Campaign
-from compare.kit.drawing import Evidence
-from compare.kit.engines import FREE, USUAL_ENGINES, Engine, Role
-from compare.kit.levels import Level
-from compare.kit.plan import planned
-from compare.kit.programme import Job, Protocol
-from compare.kit.progress import Show, ValidationProgress, show_nothing
-from compare.kit.record import Missing, Records, RecordsByEngine
-from compare.kit.runner import Runner
-from compare.kit.workers import JUDGING, LateError, Spread, Workers, at_most, processes
+from compare.campaign.campaign import Campaign
+from compare.campaign.progress import Show, ValidationProgress, show_nothing
+from compare.campaign.workers import JUDGING, LateError, Spread, Workers, at_most, processes
+from compare.engines.study import FREE, USUAL_ENGINES, Engine, Role
+from compare.figures.drawing import Evidence
+from compare.method.protocol import Job, Protocol, run, with_needed
+from compare.method.record import Missing, Records, RecordsByEngine
+from compare.method.runner import Runner
+from compare.plan import Level, planned
 from compare.report import results
 from compare.report.results import Summary
+from compare.subjects.catalogue import CLAIMS, PROTOCOLS
+from compare.verification.assessment import full_verdict
+from compare.verification.claim import Claim, Outcome, Verdict
+from compare.verification.judge import forget, select
 from model import Parameters
 from model.errors import check_type
 
@@ -143,7 +141,7 @@ def plan(
     if claims is None:
         names = [protocol.name for protocol in PROTOCOLS]
     results.open_directory(output)
-    needed = programme.with_needed(PROTOCOLS, names)
+    needed = with_needed(PROTOCOLS, names)
     free = [replace(FREE, role=Role.FREE_BODY)] if level > Level.QUICK else []
     engines = [engine] if engine else [*USUAL_ENGINES, *free]
     return Study(output, level, engines, chosen, needed, sets)
@@ -188,7 +186,7 @@ def measure(study: Study, campaign: Campaign, far: ValidationProgress) -> Iterat
     records = {each.name: dict.fromkeys(each.divisors, Records()) for each in study.engines}
     measured = SoFar(records, Counter(job.protocol.name for job in jobs))
     yield measured
-    for job, found in programme.run(jobs):
+    for job, found in run(jobs):
         far.measured(job.name)
         measured.take(job, found)
         yield measured

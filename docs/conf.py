@@ -25,7 +25,7 @@ from sphinx.environment import BuildEnvironment
 from sphinx.util import logging
 
 from compare.commands import options, parsers
-from compare.kit.pages import typeset
+from compare.figures.pages import typeset
 
 HERE = Path(__file__).parent
 PACKAGES = ("model", "analytic", "mjsim", "compare")

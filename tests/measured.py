@@ -7,10 +7,10 @@ import numpy as np
 import numpy.typing as npt
 
 import analytic
-from compare.claim import Claim, Criterion, Verdict
-from compare.judge import forget, verdict
-from compare.kit.conditions import Conditions
-from compare.kit.record import Measurement, Records
+from compare.method.conditions import Conditions
+from compare.method.record import Measurement, Records
+from compare.verification.claim import Claim, Criterion, Verdict
+from compare.verification.judge import forget, verdict
 from model import Events, Flow, Header, Parameters, Trajectory
 from model.trajectory import SAMPLE
 

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import h5py
 
-from compare.kit import record
-from compare.kit.record import Missing, Records
+from compare.method import record
+from compare.method.record import Missing, Records
 from model import InputError
 
 

@@ -159,6 +159,20 @@ def slowest_time_constant(of: StationarySolution) -> float:
     return float(1 / decaying.min()) if decaying.size else np.inf
 
 
+def time_taken_along(p: Parameters, omega_c: float) -> float:
+    """Time constant in s with which the fluid takes along a ball near an orbit: (1 + 2 j)/c, with
+    the c of its lag and no less than Stokes'; inf without drag."""
+    c = max(p.c, drag.coefficient(abs(p.omega_0 - omega_c) * p.R, p))
+    return (1 + 2 * p.j) / c if c else np.inf
+
+
+def time_constant(p: Parameters, of: StationarySolution) -> float:
+    """Time constant in s with which a ball that starts anywhere comes to a stationary state."""
+    taken = time_taken_along(p, float(of.state.omega_c))
+    within = slowest_time_constant(of)
+    return max(taken, within) if np.isfinite(within) else taken
+
+
 def _solution(
     case: Case,
     p: Parameters,

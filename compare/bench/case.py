@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from compare.adapters.scene import TIME_STEPS, Body, Scene, Surface, in_body_axes
-from compare.kit.statistics import plain
+from compare.engines.adapters.scene import TIME_STEPS, Body, Scene, Surface, in_body_axes
+from compare.method.statistics import plain
 from model import InputError
 from model.arrays import Array
 from model.files import reading_json

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from compare.adapters.scene import Body, Surface, Vector
 from compare.bench.case import ContactCase
+from compare.engines.adapters.scene import Body, Surface, Vector
 from model import Parameters, State
 from model.arrays import Array
 

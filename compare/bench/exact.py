@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 
 import analytic
-from compare.adapters.vessel import scene_fields
 from compare.bench.case import TOLERANCE, VERSION, ContactCase
 from compare.bench.closed_forms import CLOSED_FORMS
 from compare.bench.mechanisms import MECHANISMS
 from compare.bench.oblique import OBLIQUE
+from compare.engines.adapters.vessel import scene_fields
 from model import Parameters, State, Trajectory
 from model.arrays import Array
 from model.files import check_ours, make_directory, write_text

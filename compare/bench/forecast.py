@@ -31,7 +31,7 @@ from compare.bench.settled import (
     step_to_most_contacts,
     with_control,
 )
-from compare.kit.progress import part
+from compare.campaign.progress import part
 from model import InputError
 from model.errors import few
 

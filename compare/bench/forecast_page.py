@@ -10,7 +10,7 @@ from compare.bench.advice import FAULTS
 from compare.bench.contact_law import FAINT
 from compare.bench.forecast import SHOWN, Forecast
 from compare.bench.settled import NOISE
-from compare.kit import pages
+from compare.figures import pages
 from model.errors import few
 
 SLIGHT = 0.05

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from compare.adapters.free import BodyState
-from compare.adapters.mujoco_free import Bodies, studied
-from compare.kit.engines import PLAIN
-from compare.kit.tasks import Task, carry_out
+from compare.campaign.tasks import Task, carry_out
+from compare.engines.adapters.free import BodyState
+from compare.engines.adapters.mujoco_free import Bodies, studied
+from compare.engines.study import PLAIN
 from model import InputError
 from model.kinematics import to_world
 

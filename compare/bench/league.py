@@ -11,19 +11,19 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from compare.adapters import STUDIED
 from compare.bench.case import TOLERANCE, VERSION
 from compare.bench.exact import cases
 from compare.bench.runner import FLOORS, Result, run_all
-from compare.kit.pages import Rows
-from compare.kit.progress import Show
-from compare.kit.statistics import plain
-from compare.kit.workers import threads
+from compare.campaign.progress import Show
+from compare.campaign.workers import threads
+from compare.engines.adapters import STUDIED
+from compare.figures.pages import Rows
+from compare.method.statistics import plain
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_OWN = "compare.adapters"
+_OWN = "compare.engines.adapters"
 
 
 class LeagueEntry(NamedTuple):
@@ -226,7 +226,7 @@ def draw(league: Mapping[str, Sequence[Result]]) -> Figure:
     """A figure of median errors over median costs, a panel for each kind of case."""
     from matplotlib.ticker import NullFormatter  # here, because drawing takes a second to load
 
-    from compare.kit import style
+    from compare.figures import style
 
     kinds = {case.name: case.kind for case in cases()}
     finite = {

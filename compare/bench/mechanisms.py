@@ -14,7 +14,6 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk, ellipkinc
 
-from compare.adapters.scene import Surface
 from compare.bench.case import ContactCase
 from compare.bench.closed_forms import (
     BLOCK,
@@ -30,6 +29,7 @@ from compare.bench.closed_forms import (
     sphere,
     vectors,
 )
+from compare.engines.adapters.scene import Surface
 from model.arrays import Array
 
 MECHANISMS: list[Callable[[], ContactCase]] = []

@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from compare.adapters.scene import Surface
 from compare.bench.case import ContactCase
 from compare.bench.closed_forms import (
     BLOCK,
@@ -32,6 +31,7 @@ from compare.bench.closed_forms import (
     vectors,
 )
 from compare.bench.mechanisms import BALANCE, TRIPOD, WRONG_TRIPODS, integrated, tripod
+from compare.engines.adapters.scene import Surface
 from model.arrays import Array
 
 OBLIQUE: list[Callable[[], ContactCase]] = []

@@ -35,9 +35,9 @@ from typing import Any
 
 import numpy as np
 
-from compare import adapters
-from compare.adapters.scene import TIME_STEPS
 from compare.bench.case import TOLERANCE, ContactCase
+from compare.engines import adapters
+from compare.engines.adapters.scene import TIME_STEPS
 from model import InputError
 from model.arrays import Array
 from model.parameters import POSITIVE, check_choice, check_number

@@ -1,3 +1,3 @@
 """The commands."""
 
-import compare.kit  # noqa: F401  (it says so where somebody else's `model` is in the way)
+import compare.engines  # noqa: F401  (it says so where somebody else's `model` is in the way)

@@ -15,12 +15,12 @@ from analytic.orbits import orbit_branch
 from analytic.orbits.attractors import Attractor
 from analytic.orbits.periodic import Orbit
 from analytic.simulation.ensemble import interval
+from compare.campaign.sweep import Axis, grid
+from compare.campaign.tasks import carry_out
 from compare.commands import options, running
-from compare.kit import drawing, pages
-from compare.kit.engines import EVENT
-from compare.kit.statistics import plain
-from compare.kit.sweep import Axis, grid
-from compare.kit.tasks import carry_out
+from compare.engines.study import EVENT
+from compare.figures import drawing, pages
+from compare.method.statistics import plain
 from compare.subjects.attractors.basins import ATTRACTORS, basins
 from model import InputError, Parameters, State, Trajectory
 from model.arrays import Array

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from compare.commands import options
-from compare.kit import pages
+from compare.figures import pages
 from model import InputError
 from model.files import check_ours, make_directory, write_text
 from model.parameters import check_names
@@ -31,8 +31,8 @@ def run_league(args: argparse.Namespace) -> int:
     """Run engines on the exact cases, show the table, write JSON and page."""
     # here and below, because a list of the cases waits for no engine
     from compare.bench import league, runner
-    from compare.kit import progress
-    from compare.kit.pictures import embedded, svg
+    from compare.campaign import progress
+    from compare.figures.pictures import embedded, svg
 
     chosen = {name: league.entry(name).where for name in args.engine or league.ENTRIES}
     modules = {
@@ -86,7 +86,7 @@ def run_forecast(args: argparse.Namespace) -> int:
     from rich.text import Text
 
     from compare.bench import forecast, forecast_page, settled
-    from compare.kit import progress
+    from compare.campaign import progress
 
     creep = args.max_creep or forecast.Tolerances.creep
     tolerances = forecast.Tolerances(creep, args.max_depth)

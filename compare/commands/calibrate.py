@@ -12,8 +12,8 @@ import analytic
 from analytic.bifurcation import diagram as bifurcation
 from analytic.flowmeter import design, real_fluid
 from compare.commands import options
-from compare.kit import drawing, pages
-from compare.kit.doubt import model_warning, torque_left_out
+from compare.figures import drawing, pages
+from compare.figures.validity import model_warning, torque_left_out
 from compare.report import meter
 from model import InputError, Parameters, table
 from model.arrays import Array

@@ -7,16 +7,16 @@ from pathlib import Path
 
 from compare import testing
 from compare.commands import options
-from compare.kit import collection, drawing
-from compare.view import motions
+from compare.figures import drawing
+from compare.view import collection, motions
 from model import InputError, storage, table
 from model.parameters import check_names
 
 
 def figures(args: argparse.Namespace) -> int:
     """Draw every figure, or those named; one whose results are missing is told of."""
-    from compare import gallery as registry
     from compare import validation  # here, because drawing takes a second to load
+    from compare.report import gallery as registry
     from compare.report import results
 
     if args.results:

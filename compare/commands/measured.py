@@ -11,8 +11,8 @@ from analytic.bifurcation import diagram as bifurcation
 from analytic.flowmeter import measured, real_fluid
 from analytic.flowmeter.measured import Fit
 from compare.commands import options
-from compare.kit import drawing, pages
-from compare.kit.doubt import model_warning
+from compare.figures import drawing, pages
+from compare.figures.validity import model_warning
 from compare.report.meter import SYMBOLS, rounded
 from model import InputError, table
 from model.arrays import Array

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from compare.adapters import STUDIED
-from compare.kit.pages import readable
+from compare.engines.adapters import STUDIED
+from compare.figures.pages import readable
 from model import InputError, Parameters, drag
 from model.errors import suggestion
 from model.files import check_writable
@@ -205,10 +205,10 @@ def results(text: str) -> Path:
 
 def engine(name: str) -> Any:
     """An engine by its name, for argparse: one that can run here."""
-    from compare.kit import engines  # here, because help waits for none of them
+    from compare.engines import study  # here, because help waits for none of them
 
     try:
-        found = engines.engine(name)
+        found = study.engine(name)
         found.check()
         return found
     except InputError as error:
@@ -268,7 +268,7 @@ def warn(said: str) -> None:
 def warn_of_model(*sets: Parameters) -> None:
     """Warn where the paper's model leaves out too much of a fluid that is known."""
     from analytic.flowmeter import real_fluid  # here, because help needs none of it
-    from compare.kit.doubt import model_warning
+    from compare.figures.validity import model_warning
 
     for doubt in model_warning(max(map(real_fluid.model_error, sets))):
         warn(doubt.removeprefix("Warning: "))
@@ -332,7 +332,7 @@ def show(data: Any, as_json: bool, *shown: Any) -> None:
     """Print data as JSON, numbers that are not finite as null; or what is shown of it, tables and
     lines."""
     if as_json:
-        from compare.kit.statistics import plain  # here, because help needs no arrays
+        from compare.method.statistics import plain  # here, because help needs no arrays
 
         print(json.dumps(plain(data), indent=1))
         return
@@ -356,8 +356,7 @@ def add_own_set(parser: Parser, which: str = "instead of many") -> None:
 def add_axes(
     parser: Parser, option: str, meaning: str, form: str = "NAME=FROM:TO:COUNT", **more: Any
 ) -> None:
-    """An option for ranges or lists of values (`compare.kit.sweep.Axis`), to be given once or more
-    often."""
+    """An option for ranges or lists of values (`sweep.Axis`), to be given once or more often."""
     parser.add_argument(
         option, action="append", metavar=form, help=meaning, **{"default": [], **more}
     )

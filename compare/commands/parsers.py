@@ -481,14 +481,15 @@ def _complete(parser: Parser, commands: options.Commands, shell: Sequence[str]) 
 
 def _name_values(commands: options.Commands) -> None:
     """Let shells complete sets, laws, engines, claims, cases and figures by their names."""
-    from compare import catalogue, gallery  # here, because nothing else waits for them
-    from compare.bench import exact, league
-    from compare.kit import engines
+    from compare.bench import exact, league  # here, because nothing else waits for them
+    from compare.engines import study
+    from compare.report import gallery
+    from compare.subjects import catalogue
 
     known = {
         "--set": Parameters.names(),
         "--drag": drag.LAWS,
-        "--engine": engines.ENGINES,
+        "--engine": study.ENGINES,
         "--claim": [claim.id for claim in catalogue.CLAIMS],
         "--figure": gallery.FIGURES,
         "--format": gallery.FORMATS,

@@ -16,10 +16,10 @@ from analytic.bifurcation import diagram
 from analytic.flowmeter import real_fluid
 from analytic.mechanics import drag
 from compare.commands import options
-from compare.kit import pages
-from compare.kit.doubt import model_warning, torque_left_out
-from compare.kit.pages import readable
-from compare.kit.quantities import QUANTITIES
+from compare.figures import pages
+from compare.figures.pages import readable
+from compare.figures.validity import model_warning, torque_left_out
+from compare.method.quantities import QUANTITIES
 from compare.report import meter
 from model import Case, Parameters, table
 from model.drag import LAWS, REYNOLDS, SCHILLER_NAUMANN

@@ -7,12 +7,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from compare.campaign import progress
+from compare.campaign.campaign import Campaign
+from compare.campaign.tasks import Task
+from compare.campaign.workers import Workers, dask, processes
 from compare.commands.options import given_options
-from compare.kit import engines, progress
-from compare.kit.campaign import Campaign
-from compare.kit.engines import AnySettings
-from compare.kit.tasks import Task
-from compare.kit.workers import Workers, dask, processes
+from compare.engines import study
+from compare.engines.study import AnySettings
 from model import Flow, InputError, Parameters, State
 from model.kinematics import UNITS, VARIABLES
 from model.parameters import REACH, Range, check_names, check_number, parse_number
@@ -42,7 +43,7 @@ def flow(args: argparse.Namespace) -> Flow | None:
 
 def settings(args: argparse.Namespace, p: Parameters) -> AnySettings:
     """Settings of the chosen engine for a ball; `InputError` for an option of others."""
-    chosen: engines.Engine = args.engine
+    chosen: study.Engine = args.engine
     given = given_options(args, ("timestep", "rtol", "restitution"))
     for name in given:
         if name not in chosen.options:

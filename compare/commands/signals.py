@@ -11,7 +11,7 @@ from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import NoReturn
 
-from compare.stops import SIGNALS
+from compare.campaign.stops import SIGNALS
 from model.files import leave
 
 _SEND_AGAIN = 2.0

@@ -10,10 +10,10 @@ import tempfile
 from contextlib import nullcontext, suppress
 from pathlib import Path
 
+from compare.campaign import progress, sweep
+from compare.campaign.tasks import Task, failed_path, store
 from compare.commands import options, running, signals
-from compare.kit import collection, progress, steady, sweep
-from compare.kit.tasks import Task, failed_path, store
-from compare.view import motions
+from compare.view import collection, motions, steady
 from model import Flow, InputError, Parameters, storage, table
 from model.files import reading_json, write_text
 

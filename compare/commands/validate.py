@@ -13,13 +13,14 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from compare.catalogue import CLAIMS
-from compare.claim import Outcome, Verdict
+from compare.campaign import progress
 from compare.commands import options, running
-from compare.kit import pages, progress
-from compare.kit.levels import Level, sets
-from compare.kit.pages import readable
+from compare.figures import pages
+from compare.figures.pages import readable
+from compare.plan import Level, sets
 from compare.report import results, wording
+from compare.subjects.catalogue import CLAIMS
+from compare.verification.claim import Outcome, Verdict
 
 WIDTH, SAYS = 100, 32
 """Columns of a claim's line, and of what it says, in short."""

@@ -6,8 +6,8 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from compare.kit import compiling
-from compare.kit.compiling import OFTEN, SOON
+from compare.campaign import compiling
+from compare.campaign.compiling import OFTEN, SOON
 
 
 @contextmanager
@@ -25,7 +25,7 @@ def told(what: str) -> Iterator[Callable[[float], None]]:
             compiling.listen()
             if ended.wait(OFTEN):
                 return
-        from compare.kit import progress  # here, because most commands are done before
+        from compare.campaign import progress  # here, because most commands are done before
 
         with progress.reporter() as show:
             while not ended.wait(OFTEN):

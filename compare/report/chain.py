@@ -11,19 +11,19 @@ from pathlib import Path
 from types import CodeType, FrameType
 from typing import Any
 
-from compare import judge
-from compare.catalogue import PROTOCOLS
-from compare.claim import Claim, Criterion, Verdict
-from compare.kit import plan
-from compare.kit.engines import ENGINES
-from compare.kit.levels import Level
-from compare.kit.pages import Rows, pairs, readable, table
-from compare.kit.quantities import quantity
-from compare.kit.record import Check, Measurement
+from compare import plan
+from compare.engines.study import ENGINES
+from compare.figures.pages import Rows, pairs, readable, table
+from compare.method.quantities import quantity
+from compare.method.record import Check, Measurement
+from compare.plan import Level
 from compare.report import wording
 from compare.report.results import Summary
+from compare.subjects.catalogue import PROTOCOLS
+from compare.verification import judge
+from compare.verification.claim import Claim, Criterion, Verdict
 
-ROOT = Path(judge.__file__).parents[1]
+ROOT = Path(judge.__file__).parents[2]
 """Relative to which files are named."""
 LISTED = 12
 """Most numbers of a criterion that are listed."""

@@ -11,9 +11,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from statistics import median
 
-from compare.claim import Verdict
-from compare.kit.quantities import QUANTITIES
-from compare.kit.record import Check, Relation
+from compare.method.quantities import QUANTITIES
+from compare.method.record import Check, Relation
+from compare.verification.claim import Verdict
 
 SOLVERS = frozenset({"solver", "solver_at_random", "rounding"})
 """Causes of which one accuracy is known for all numbers. What is left of them is spread over many

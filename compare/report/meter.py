@@ -14,9 +14,9 @@ from analytic.flowmeter import real_fluid
 from analytic.flowmeter.characteristic import End
 from analytic.flowmeter.design import THRESHOLDS, Choice, Design
 from analytic.mechanics import drag
-from compare.kit import pages
-from compare.kit.doubt import model_warning, torque_left_out
-from compare.kit.quantities import QUANTITIES
+from compare.figures import pages
+from compare.figures.validity import model_warning, torque_left_out
+from compare.method.quantities import QUANTITIES
 
 SYMBOLS = {"mu": "μ", "eta": "η", "rho_b": "ρ_b", "rho_f": "ρ_f", "nu_f": "ν_f"}
 SYMBOLS |= {key: QUANTITIES[key].symbol for key in THRESHOLDS}
@@ -185,7 +185,7 @@ def described(made: Design) -> dict[str, Any]:
 
 def page(made: Design) -> str:
     """A design as a self-contained page, in HTML."""
-    from compare.kit.pictures import embedded, svg  # here, because drawing takes a second to load
+    from compare.figures.pictures import embedded, svg  # here, because drawing is slow to load
     from compare.subjects.flowmeter.figures import OF_A_METER
 
     r, bounds = made.request, made.request.bounds[made.material]

@@ -15,15 +15,15 @@ from typing import Any
 
 from markdown_it import MarkdownIt
 
-from compare.claim import Outcome, Verdict
-from compare.gallery import FIGURES, figures_of, pictures
-from compare.kit import pages
-from compare.kit.drawing import Evidence, Figures
-from compare.kit.levels import Level
-from compare.kit.record import Check, Measurement, Records
-from compare.kit.workers import Spread
+from compare.campaign.workers import Spread
+from compare.figures import pages
+from compare.figures.drawing import Evidence, Figures
+from compare.method.record import Check, Measurement, Records
+from compare.plan import Level
 from compare.report import deviations, results, wording
+from compare.report.gallery import FIGURES, figures_of, pictures
 from compare.report.results import Summary
+from compare.verification.claim import Outcome, Verdict
 from model import storage
 from model.files import write_text
 

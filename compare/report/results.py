@@ -12,11 +12,11 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from compare.claim import Verdict
-from compare.kit import record
-from compare.kit.levels import Level
-from compare.kit.record import Records, RecordsByEngine
-from compare.kit.statistics import plain
+from compare.method import record
+from compare.method.record import Records, RecordsByEngine
+from compare.method.statistics import plain
+from compare.plan import Level
+from compare.verification.claim import Verdict
 from model.errors import StorageError
 from model.files import check_ours, make_directory, reading_json, write_text
 from model.versions import current_commit, current_versions

@@ -8,12 +8,12 @@ from collections.abc import Mapping, Sequence
 from statistics import median
 from typing import Any
 
-from compare.claim import EngineVerdict, Outcome, Text, Verdict
-from compare.kit.conditions import UNITS, Conditions
-from compare.kit.engines import ENGINES
-from compare.kit.pages import readable
-from compare.kit.quantities import QUANTITIES, quantity
-from compare.kit.record import Check, Measurement
+from compare.engines.study import ENGINES
+from compare.figures.pages import readable
+from compare.method.conditions import UNITS, Conditions
+from compare.method.quantities import QUANTITIES, quantity
+from compare.method.record import Check, Measurement
+from compare.verification.claim import EngineVerdict, Outcome, Text, Verdict
 from model import Case
 
 SYMBOLS = {name: each.symbol for name, each in QUANTITIES.items()} | {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from compare.kit.style import COLOURS, SLIP
+from compare.figures.style import COLOURS, SLIP
 from model import Case, Contact
 
 _DOES = {Contact.R: "rolls on", Contact.S: "slips on", Contact.N: "is off"}

@@ -29,14 +29,14 @@ import analytic
 from analytic.bifurcation import diagram as bifurcation
 from analytic.bifurcation.diagram import Exists
 from analytic.flowmeter import real_fluid
-from compare.branches import slipping_curve, stable_ends
-from compare.kit import compiling, steady
-from compare.kit.doubt import model_warning, torque_left_out
-from compare.kit.pages import typeset
-from compare.kit.style import COLOURS
-from compare.stops import SIGNALS
+from compare.campaign import compiling
+from compare.campaign.stops import SIGNALS
+from compare.figures.branches import slipping_curve, stable_ends
+from compare.figures.pages import typeset
+from compare.figures.style import COLOURS
+from compare.figures.validity import model_warning, torque_left_out
 from compare.subjects.thresholds.figures import TINTS
-from compare.view import cases
+from compare.view import cases, steady
 from compare.view import page as motion
 from model import Case, InputError, Parameters, SimulationError, State, Trajectory, drag, storage
 from model.parameters import REACH, parse_number

@@ -15,8 +15,9 @@ import numpy as np
 from rich.table import Table
 
 from analytic.flowmeter import real_fluid
-from compare.kit import drawing, pages, steady
+from compare.figures import drawing, pages
 from compare.testing import UNITS, Series, common_times, difference
+from compare.view import steady
 from model import Case, Flow, InputError, Parameters, Trajectory, kinematics, storage
 from model import table as storage_table
 from model.kinematics import VARIABLES
@@ -196,7 +197,7 @@ def compared_tables(about: dict[str, Any]) -> list[Any]:
 
 def draw_both(a: Series, b: Series) -> Figure:
     """A figure of two motions in common quantities, on the first one's cases."""
-    from compare.kit import style  # here, because drawing takes a second to load
+    from compare.figures import style  # here, because drawing takes a second to load
 
     names = [name for name in a.values if name in b.values]
     shown = ("omega_c", "slip_x", "slip_y", "slip_z", "y", "h")
@@ -227,7 +228,7 @@ def draw_both(a: Series, b: Series) -> Figure:
 
 def draw(run: Trajectory) -> Figure:
     """A figure of omega_c, slip, gaps and forces over time, on the colours of cases."""
-    from compare.kit import style  # here, because drawing takes a second to load
+    from compare.figures import style  # here, because drawing takes a second to load
 
     t, p = run.time, run.header.parameters
     blue, green, orange, red, pink = "#0072B2", "#009E73", "#E69F00", "#D55E00", "#CC79A7"

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from compare.kit.pages import render
-from compare.kit.style import BALL, COLOURS, FORCE, SLIP
+from compare.figures.pages import render
+from compare.figures.style import BALL, COLOURS, FORCE, SLIP
 from compare.view.geometry import geometry, resampled
 from model import Case, InputError, Parameters, Trajectory
 from model.arrays import Array

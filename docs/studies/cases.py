@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyArrowPatch, Rectangle
 
 from analytic.slipping.slip_stability import LIFT_ARROWS, SLIP_ARROWS
-from compare.kit import style
+from compare.figures import style
 from model import Case, Contact
 from model.cases import TRAITS
 

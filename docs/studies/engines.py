@@ -11,16 +11,16 @@ from pathlib import Path
 from statistics import median
 from unittest import mock
 
-from compare import convergence
-from compare.assessment import full_verdict
-from compare.catalogue import CLAIMS
-from compare.claim import Outcome, Verdict
-from compare.kit import quantities
-from compare.kit.engines import PLAIN
-from compare.kit.pages import Rows
-from compare.kit.record import Relation
+from compare.engines.study import PLAIN
+from compare.figures.pages import Rows
+from compare.method import quantities
+from compare.method.record import Relation
 from compare.report import wording
+from compare.subjects.catalogue import CLAIMS
 from compare.validation import stored
+from compare.verification import convergence
+from compare.verification.assessment import full_verdict
+from compare.verification.claim import Outcome, Verdict
 
 QUANTITIES = {
     "angular velocity ω_c": ("omega_c",),
@@ -128,7 +128,7 @@ def _required(times: float) -> Iterator[None]:
 
 
 def _constant(name: str) -> Callable[[float], AbstractContextManager[None]]:
-    """A constant of `compare.convergence` multiplied."""
+    """A constant of `compare.verification.convergence` multiplied."""
     return lambda times: mock.patch.object(convergence, name, times * getattr(convergence, name))
 
 

@@ -7,9 +7,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from compare.convergence import extrapolated
-from compare.kit.pages import Rows
-from compare.kit.statistics import COVERAGE
+from compare.figures.pages import Rows
+from compare.method.statistics import COVERAGE
+from compare.verification.convergence import extrapolated
 from model.arrays import Array
 
 COUNT = 4000

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from compare.kit import drawing
+from compare.figures import drawing
 from compare.subjects.attractors import figures as attractors
 from compare.subjects.attractors.basins import Basins
 from docs.studies import cases

@@ -18,7 +18,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from compare.kit.pages import Rows
+from compare.figures.pages import Rows
 from docs.studies.small_scenes import FLOOR, free
 from docs.studies.small_scenes import model as world
 from docs.studies.tables import write_all

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from compare.kit import pages
+from compare.figures import pages
 from model.files import write_text
 from tests.mutants.theories import FOR_TESTS, THEORIES
 from tests.mutants.trial import KINDS, LONGEST, SLOWER, Judged, Trial, name_of

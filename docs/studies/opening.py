@@ -15,8 +15,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle, Rectangle
 
 import analytic
-from compare.kit import style
-from compare.kit.tasks import Task, carry_out
+from compare.campaign.tasks import Task, carry_out
+from compare.figures import style
 from model import Case, Parameters, State
 
 PICTURE = Path(__file__).parents[1] / "opening.png"

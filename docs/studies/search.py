@@ -27,8 +27,8 @@ from analytic import simulate, simulate_many
 from analytic.orbits.attractors import periodic_limit
 from analytic.orbits.periodic import landings
 from analytic.simulation.ensemble import interval
-from compare.kit import pages, style
-from compare.kit.sweep import sobol
+from compare.campaign.sweep import sobol
+from compare.figures import pages, style
 from compare.subjects.attractors.measure import with_groups
 from model import Parameters, SimulationError, State
 from model.arrays import Array

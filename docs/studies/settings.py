@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from compare.kit import drawing, style
-from compare.kit.campaign import Campaign
-from compare.kit.engines import (
+from compare.campaign.campaign import Campaign
+from compare.campaign.tasks import Task, carry_out
+from compare.engines.study import (
     DEFAULTS,
     EVENT,
     MOREAU,
@@ -26,8 +26,8 @@ from compare.kit.engines import (
     AnySettings,
     plain,
 )
-from compare.kit.pages import Rows
-from compare.kit.tasks import Task, carry_out
+from compare.figures import drawing, style
+from compare.figures.pages import Rows
 from docs.studies.states import (
     APPROACH,
     HITTING,

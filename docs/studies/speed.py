@@ -23,11 +23,11 @@ from scipy.integrate import DOP853, LSODA
 import mjsim
 from analytic import Settings, simulate, simulate_many, solution, stable_solutions
 from analytic.simulation.ensemble import random_starts
-from compare.kit.campaign import Campaign
-from compare.kit.engines import MUJOCO
-from compare.kit.pages import Rows
-from compare.kit.tasks import Task
-from compare.kit.workers import processes
+from compare.campaign.campaign import Campaign
+from compare.campaign.tasks import Task
+from compare.campaign.workers import processes
+from compare.engines.study import MUJOCO
+from compare.figures.pages import Rows
 from docs.studies.tables import write_all
 from docs.studies.ways import processor_time
 from mjsim import scene

@@ -3,8 +3,8 @@ test, theory against theory."""
 
 from __future__ import annotations
 
-from compare.catalogue import CLAIMS
-from compare.kit.pages import Rows
+from compare.figures.pages import Rows
+from compare.subjects.catalogue import CLAIMS
 
 TESTS = {
     "test_other_ways::test_figure_12_with_a_floor_that_pulls": (

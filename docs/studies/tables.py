@@ -21,9 +21,10 @@ import matplotlib
 
 from compare.bench import league
 from compare.bench.runner import Result
-from compare.kit import drawing, pages, progress
-from compare.kit.campaign import Campaign
-from compare.kit.pages import Rows
+from compare.campaign import progress
+from compare.campaign.campaign import Campaign
+from compare.figures import drawing, pages
+from compare.figures.pages import Rows
 from docs.studies import engines, extrapolation, settings, statements
 from model import InputError
 from model.files import make_directory, write_text

@@ -9,15 +9,15 @@ from typing import Any
 import pytest
 
 import analytic
-from compare.gallery import FIGURES
-from compare.kit import record
-from compare.kit.campaign import Campaign
-from compare.kit.drawing import GapError
-from compare.kit.engines import EVENT
-from compare.kit.levels import Level
-from compare.kit.record import Missing, Origin, Records
-from compare.kit.runner import Runner
+from compare.campaign.campaign import Campaign
+from compare.engines.study import EVENT
+from compare.figures.drawing import GapError
+from compare.method import record
+from compare.method.record import Missing, Origin, Records
+from compare.method.runner import Runner
+from compare.plan import Level
 from compare.report import report, results
+from compare.report.gallery import FIGURES
 from compare.report.results import Summary
 from model import Parameters, storage
 from tests.commands import METER, SCENE

@@ -6,12 +6,18 @@ import math
 import numpy as np
 import pytest
 
-from compare.assessment import full_verdict
-from compare.claim import Criterion, Outcome
-from compare.convergence import COARSEST, LOOSER, StepSeries, extrapolated, zero_step_limit
-from compare.kit.quantities import quantity
-from compare.kit.record import Check, Missing, Records
-from compare.kit.statistics import COVERAGE
+from compare.method.quantities import quantity
+from compare.method.record import Check, Missing, Records
+from compare.method.statistics import COVERAGE
+from compare.verification.assessment import full_verdict
+from compare.verification.claim import Criterion, Outcome
+from compare.verification.convergence import (
+    COARSEST,
+    LOOSER,
+    StepSeries,
+    extrapolated,
+    zero_step_limit,
+)
 from model import Parameters
 from tests.measured import claim, measured
 

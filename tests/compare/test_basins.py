@@ -7,8 +7,8 @@ import pytest
 
 from analytic import stable_solutions
 from analytic.simulation.ensemble import interval
-from compare.kit.campaign import Campaign
-from compare.kit.sweep import Axis
+from compare.campaign.campaign import Campaign
+from compare.campaign.sweep import Axis
 from compare.subjects.attractors.basins import ATTRACTORS, Basins, basins
 from docs.studies.search import BOX, KEPT, confirm, parameters, random_starts, screen
 from model import Parameters, StorageError, storage

@@ -20,12 +20,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from compare.campaign.campaign import FAILURES, Campaign, Failure, Storing, run_batch
+from compare.campaign.lock import Lock
+from compare.campaign.tasks import Task
+from compare.campaign.workers import Workers, _without_signals, dask, first_done, processes
 from compare.commands import cli
-from compare.kit import collection
-from compare.kit.campaign import FAILURES, Campaign, Failure, Storing, run_batch
-from compare.kit.lock import Lock
-from compare.kit.tasks import Task
-from compare.kit.workers import Workers, _without_signals, dask, first_done, processes
+from compare.view import collection
 from mjsim import RigidContacts
 from model import Flow, InputError, Parameters, SimulationError, StorageError, storage
 from model.trajectory import Trajectory, columns
@@ -84,7 +84,7 @@ def test_no_more_is_held_than_there_is_memory_for(tmp_path, monkeypatch):
     loaded, told, read = [], [], storage.load_runs
     monkeypatch.setattr(storage, "load_runs", lambda path: [loaded.append(path), read(path)][1])
     for room, times in ((2**19, [2, 2, 4, 4]), (500, [2, 4, 6, 8])):
-        monkeypatch.setattr("compare.kit.campaign.READ", room)
+        monkeypatch.setattr("compare.campaign.campaign.READ", room)
         seen = []
         for _ in range(2):
             with Campaign(
@@ -100,7 +100,7 @@ def test_no_more_is_held_than_there_is_memory_for(tmp_path, monkeypatch):
 def test_it_is_told_how_far_long_runs_are(tmp_path, monkeypatch, undisturbed):
     """Also where all of them would fit into one batch."""
     told = list[int]()
-    monkeypatch.setattr("compare.kit.campaign.MOST_STEPS", 2.5 * tasks()[0].steps)
+    monkeypatch.setattr("compare.campaign.campaign.MOST_STEPS", 2.5 * tasks()[0].steps)
     completed(tmp_path, report=lambda what, done, total, failed: told.append(done))
     assert told == [*range(0, len(tasks()), 2), len(tasks())]
     assert data(tmp_path) == undisturbed
@@ -133,8 +133,8 @@ def test_passing_runs_are_stored_where_memory_is_short_or_they_took_long(
         ("tight", 500, 1e9, 3),
         ("slow", 2**18, 0.0, 5),
     ):
-        monkeypatch.setattr("compare.kit.campaign.READ", room)
-        monkeypatch.setattr("compare.kit.campaign.SOON_DONE", short)
+        monkeypatch.setattr("compare.campaign.campaign.READ", room)
+        monkeypatch.setattr("compare.campaign.campaign.SOON_DONE", short)
         with Campaign(tmp_path / where, workers=0, batch=2, passing=True) as campaign:
             runs = campaign.run(tasks())
             assert len(written(tmp_path / where)) == files
@@ -148,8 +148,8 @@ def test_passing_runs_are_stored_where_memory_is_short_or_they_took_long(
 def test_what_memory_cannot_hold_goes_into_files_as_long_as_a_batch(tmp_path, monkeypatch):
     """Runs of 201 samples each, of which five are held and two make a batch; a file of all that
     were held would be read again for each of its runs."""
-    monkeypatch.setattr("compare.kit.campaign.READ", 1100)
-    monkeypatch.setattr("compare.kit.campaign.HELD", 450)
+    monkeypatch.setattr("compare.campaign.campaign.READ", 1100)
+    monkeypatch.setattr("compare.campaign.campaign.HELD", 450)
     asked = [replace(task, sample_interval=1e-3) for task in tasks(8)]
     with Campaign(tmp_path, workers=0, passing=True) as campaign:
         assert all(len(run.time) == 201 for run in campaign.run(asked))
@@ -255,7 +255,7 @@ def test_a_task_that_kills_its_worker_is_found_and_the_rest_goes_on(
     tmp_path, undisturbed, monkeypatch
 ):
     """Workers, batches and the order of tasks change no bit."""
-    monkeypatch.setattr("compare.kit.campaign.run_batch", deadly)
+    monkeypatch.setattr("compare.campaign.campaign.run_batch", deadly)
     failures = completed(tmp_path, workers=2, batch=3, asked=reversed(tasks()))
     assert failures == [Failure(tasks()[2], "its worker died (killed, or out of memory)")]
     stored = data(tmp_path)
@@ -351,7 +351,7 @@ def test_a_scheduler_that_dies_is_said_and_what_is_whole_stays(
 ):
     """Also where all that it did is there before it is missed."""
     if slow:
-        monkeypatch.setattr("compare.kit.workers.wait", lambda futures, *how: wait(futures))
+        monkeypatch.setattr("compare.campaign.workers.wait", lambda futures, *how: wait(futures))
     fleet = Workers(1, lambda: Orphaned(2), lambda executor, at_once: executor.shutdown(), ())
     gone = "the workers' scheduler is gone; finished runs are kept"
     with pytest.raises(StorageError, match=gone), Campaign(tmp_path, fleet, batch=1) as campaign:
@@ -363,7 +363,7 @@ def test_a_scheduler_that_dies_is_said_and_what_is_whole_stays(
 
 def test_a_scheduler_that_does_not_answer(monkeypatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("compare.kit.workers.SCHEDULER_TIMEOUT", 0.5)
+    monkeypatch.setattr("compare.campaign.workers.SCHEDULER_TIMEOUT", 0.5)
     with pytest.raises(InputError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:1"):
         dask("tcp://127.0.0.1:1")
 
@@ -466,7 +466,7 @@ def test_a_file_system_without_locks_is_said(tmp_path, monkeypatch, capsys):
     def none(*_):
         raise OSError(38, "Function not implemented")
 
-    monkeypatch.setattr("compare.kit.lock.fcntl.flock", none)
+    monkeypatch.setattr("compare.campaign.lock.fcntl.flock", none)
     Lock(tmp_path).release()
     said = (
         f"dualball: {tmp_path} can't be locked (Function not implemented): start no second "

@@ -4,11 +4,11 @@ import json
 
 import pytest
 
-from compare.assessment import full_verdict
-from compare.catalogue import CLAIMS
-from compare.kit.record import Records
+from compare.method.record import Records
 from compare.report import chain
 from compare.report.results import Summary
+from compare.subjects.catalogue import CLAIMS
+from compare.verification.assessment import full_verdict
 from model import Parameters
 from tests.commands import carried_out, refused
 from tests.measured import measured

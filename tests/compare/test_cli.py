@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 
 from compare.bench import league
-from compare.catalogue import CLAIMS
+from compare.campaign import tasks
 from compare.commands import cli, design, parsers, simulate
-from compare.kit import engines, tasks
+from compare.engines import study
+from compare.subjects.catalogue import CLAIMS
 from model import Parameters, storage
 from tests.commands import ROOT, carried_out, parser_of, python, refused, told
 
@@ -152,7 +153,7 @@ def test_each_set_of_a_sweep_has_contacts_that_suit_it(tmp_path, capsys, design)
         run.header for path in tmp_path.glob("*.h5") for run in storage.load_runs(path).values()
     ]
     for header in headers:
-        suited = engines.plain(0.002).suited(header.parameters)
+        suited = study.plain(0.002).suited(header.parameters)
         assert tuple(header.settings["solref"]) == suited.solref
     assert len({tuple(header.settings["solref"]) for header in headers}) == 2
 
@@ -234,7 +235,7 @@ def test_help_names_every_command_engine_and_option_and_gives_examples_that_are_
     designs = parser_of("design").format_help()
     for fields in (design._FLUID, design._FLOW, design._BOUNDS, design._TOLERANCES, ["exit code"]):
         assert all(name in designs for name in fields)
-    for name, known in (("simulate", engines.ENGINES), ("league", league.ENTRIES)):
+    for name, known in (("simulate", study.ENGINES), ("league", league.ENTRIES)):
         words = set(re.findall(r"[\w-]+", re.sub(r"-\s+", "-", parser_of(name).format_help())))
         assert not {each for each in known if not {each, each.removesuffix("-defaults")} & words}
 

@@ -12,11 +12,12 @@ import pytest
 import xarray
 
 import analytic
-from compare.kit import collection, record
-from compare.kit.campaign import Campaign
-from compare.kit.record import Missing, Records
-from compare.kit.tasks import Task, carry_out, failed_path
+from compare.campaign.campaign import Campaign
+from compare.campaign.tasks import Task, carry_out, failed_path
+from compare.method import record
+from compare.method.record import Missing, Records
 from compare.testing import assert_tracks
+from compare.view import collection
 from model import Flow, InputError, Parameters, StorageError, storage
 from model.hdf5 import column, dataset, reading
 from tests.commands import carried_out, refused, told

@@ -17,14 +17,14 @@ import pytest
 
 import analytic
 import mjsim
-from compare.adapters import siconos
-from compare.adapters.scene import upright
-from compare.adapters.vessel import Settings, Vessel
 from compare.bench import cases, run
 from compare.bench.case import TOLERANCE
 from compare.bench.runner import EngineProcess
-from compare.kit.engines import ENGINES
-from compare.kit.tasks import Task, carry_out, store
+from compare.campaign.tasks import Task, carry_out, store
+from compare.engines.adapters import siconos
+from compare.engines.adapters.scene import upright
+from compare.engines.adapters.vessel import Settings, Vessel
+from compare.engines.study import ENGINES
 from compare.validation import validate
 from docs.studies.states import LANDING, STATES
 from mjsim import RigidContacts
@@ -151,7 +151,7 @@ def test_a_ball_may_cross_the_axis(name):
 
 @engines("drake")
 def test_a_step_that_cannot_be_solved_is_the_run_s_failure(name, monkeypatch):
-    import compare.adapters.drake as adapter
+    import compare.engines.adapters.drake as adapter
 
     monkeypatch.setattr(adapter, "STIFFNESS", 1e12)
     seen = simulated(name, P.replace(omega_0=25.0), State(), 8.0, 4e-3)
@@ -176,9 +176,9 @@ def test_what_is_not_installed_says_what_to_do(name, named, says, tmp_path, monk
     asked = ["simulate", "sweep --vary eta=0.1,0.2", "attractors", "validate"]
     if ENGINES[name].missing:  # the league loads engines in processes of their own
         asked.append("league")
-    monkeypatch.setattr("compare.adapters.free.version", lambda package: "not installed")
+    monkeypatch.setattr("compare.engines.adapters.free.version", lambda package: "not installed")
     if name != "siconos":
-        monkeypatch.setitem(sys.modules, f"compare.adapters.{name.partition('-')[0]}", None)
+        monkeypatch.setitem(sys.modules, f"compare.engines.adapters.{name.partition('-')[0]}", None)
     monkeypatch.setattr(siconos, "locate", siconos.locate.__wrapped__)  # which remembers nothing
     monkeypatch.setattr(siconos.shutil, "which", lambda *_, **__: None)
     monkeypatch.setenv("DUALBALL_SICONOS_PYTHON", named)
@@ -219,7 +219,7 @@ def test_claims_can_be_judged_with_any_engine(monkeypatch, capsys):
     assert asked == [ENGINES["mujoco-free"], None]
 
 
-OWN = "compare.adapters"
+OWN = "compare.engines.adapters"
 
 
 @pytest.mark.parametrize("name", ["dart", "drake", "pybullet", "rapier", "sapien"])

@@ -12,17 +12,17 @@ import pytest
 
 import analytic
 from analytic.orbits import orbit_branch
-from compare import gallery as registry
 from compare import plot
-from compare.catalogue import CLAIMS
-from compare.gallery import FIGURES, figures_of
-from compare.kit import collection, style
-from compare.kit.drawing import Diagram, DrawnMotion, Evidence, GapError
-from compare.kit.record import Check, Records
+from compare.figures import style
+from compare.figures.drawing import Diagram, DrawnMotion, Evidence, GapError
+from compare.method.record import Check, Records
+from compare.report import gallery as registry
+from compare.report.gallery import FIGURES, figures_of
 from compare.subjects.attractors import figures as attractors
+from compare.subjects.catalogue import CLAIMS
 from compare.subjects.flowmeter import figures as flowmeter
 from compare.subjects.unsteady import figures as unsteady
-from compare.view import motions
+from compare.view import collection, motions
 from model import InputError, Parameters, State, StorageError, storage
 from tests.commands import refused, told
 from tests.measured import measured
@@ -176,7 +176,7 @@ def test_figures_of_a_set_of_ones_own(tmp_path, capsys, monkeypatch):
     """All that theory alone can draw, by the friction of its wall, and why the others aren't
     drawn."""
     # Half of the time is that of writing.
-    monkeypatch.setattr("compare.kit.drawing.save", lambda figure, path: path.touch())
+    monkeypatch.setattr("compare.figures.drawing.save", lambda figure, path: path.touch())
     drawn = {*"fig-4 fig-5 fig-7 fig-8 fig-9 fig-11 fig-13-right unloading pulsation".split()}
     said = told(capsys, f"figures --set high-wall-friction -o {tmp_path / 'rough'}")
     assert {path.stem for path in (tmp_path / "rough").glob("*.svg")} == drawn

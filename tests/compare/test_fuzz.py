@@ -13,9 +13,9 @@ import pytest
 
 import analytic
 from compare import testing
-from compare.kit import collection, record
+from compare.method import record
 from compare.report import results
-from compare.view import motions
+from compare.view import collection, motions
 from model import InputError, Parameters, State, storage
 from model.hdf5 import seal
 from tests.commands import refused, told

@@ -12,15 +12,14 @@ from dataclasses import replace
 import pytest
 
 from compare import validation
-from compare.assessment import full_verdict
-from compare.catalogue import CLAIMS, PROTOCOLS
-from compare.claim import Claim, Criterion, Outcome, Text
-from compare.judge import select, theory
-from compare.kit.levels import Level, sets
-from compare.kit.plan import PLAN
-from compare.kit.quantities import quantity
-from compare.kit.record import Missing, Planned, Records, Relation
-from compare.kit.statistics import COVERAGE, Estimate
+from compare.method.quantities import quantity
+from compare.method.record import Missing, Planned, Records, Relation
+from compare.method.statistics import COVERAGE, Estimate
+from compare.plan import PLAN, Level, sets
+from compare.subjects.catalogue import CLAIMS, PROTOCOLS
+from compare.verification.assessment import full_verdict
+from compare.verification.claim import Claim, Criterion, Outcome, Text
+from compare.verification.judge import select, theory
 from model import InputError, Parameters
 from tests import measured as made
 from tests.measured import judged

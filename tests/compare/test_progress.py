@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from compare.kit import progress
+from compare.campaign import progress
 
 COSTS = {f"protocol {k}": 10.0 for k in range(30)}
 """Seconds on a machine that is free."""

@@ -12,19 +12,16 @@ from scipy import linalg
 
 import analytic
 from analytic.flowmeter import pulsation
-from compare.catalogue import CLAIMS
-from compare.claim import Outcome
-from compare.judge import select
-from compare.kit import levels, settling
-from compare.kit.brackets import FINER, LONGER, USUAL, Bracket, Search, narrow
-from compare.kit.conditions import state_of
-from compare.kit.engines import MUJOCO, PLAIN
-from compare.kit.levels import Level, sets
-from compare.kit.quantities import QUANTITIES
-from compare.kit.record import Missing, Records
-from compare.kit.runner import Runner, coarse_step
-from compare.kit.scales import time_unit
-from compare.kit.statistics import (
+from compare import plan
+from compare.engines.study import MUJOCO, PLAIN
+from compare.method import settling
+from compare.method.brackets import FINER, LONGER, USUAL, Bracket, Search, narrow
+from compare.method.conditions import state_of
+from compare.method.quantities import QUANTITIES
+from compare.method.record import Missing, Records
+from compare.method.runner import Runner, coarse_step
+from compare.method.scales import time_unit
+from compare.method.statistics import (
     COVERAGE,
     Estimate,
     estimate,
@@ -35,7 +32,7 @@ from compare.kit.statistics import (
     uniform,
     zero_and_slope,
 )
-from compare.kit.step_pairs import (
+from compare.method.step_pairs import (
     Start,
     at_zero_step,
     lag_error,
@@ -43,7 +40,9 @@ from compare.kit.step_pairs import (
     of_three_steps,
     unlike,
 )
+from compare.plan import Level, sets
 from compare.subjects.attractors import measure as attractors
+from compare.subjects.catalogue import CLAIMS
 from compare.subjects.flowmeter import measure as flowmeter
 from compare.subjects.motion import measure as moving
 from compare.subjects.regions import measure as regions
@@ -52,6 +51,8 @@ from compare.subjects.stability import measure as stability
 from compare.subjects.stationary import measure as settled
 from compare.subjects.thresholds import measure as thresholds
 from compare.subjects.unsteady import measure as unsteady
+from compare.verification.claim import Outcome
+from compare.verification.judge import select
 from model import Case, Flow, Parameters, State
 from tests.measured import judged, measured, motion
 from tests.measured import thresholds as known
@@ -393,7 +394,7 @@ def test_first_top_lies_between_samples():
 
 def make(patch, **sampling):
     """Another sampling at the quick level."""
-    patch.setattr(levels, "AT_QUICK", replace(levels.AT_QUICK, **sampling))
+    patch.setattr(plan, "AT_QUICK", replace(plan.AT_QUICK, **sampling))
 
 
 def measure_settled(runner, patch, p, *flows):

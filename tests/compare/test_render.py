@@ -19,7 +19,7 @@ from PIL import Image
 
 import analytic
 import mjsim
-from compare.kit import compiling
+from compare.campaign import compiling
 from compare.view import explore, geometry, page
 from model import Case, InputError, Parameters, State, storage
 from tests.commands import refused, started, told

@@ -16,18 +16,17 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from compare import gallery
-from compare.claim import Claim, EngineVerdict, Outcome, Text, Verdict
 from compare.commands import validate
 from compare.commands.bench import LEAGUE_PAGE
-from compare.kit.conditions import Conditions, state_of
-from compare.kit.drawing import Drawing, Evidence, GapError
-from compare.kit.levels import Level
-from compare.kit.pages import typeset
-from compare.kit.pictures import embedded, plain, svg
-from compare.kit.record import Check, Missing, Records
-from compare.report import deviations, report, results, wording
+from compare.figures.drawing import Drawing, Evidence, GapError
+from compare.figures.pages import typeset
+from compare.figures.pictures import embedded, plain, svg
+from compare.method.conditions import Conditions, state_of
+from compare.method.record import Check, Missing, Records
+from compare.plan import Level
+from compare.report import deviations, gallery, report, results, wording
 from compare.report.results import Summary
+from compare.verification.claim import Claim, EngineVerdict, Outcome, Text, Verdict
 from model import Parameters, StorageError
 from tests import measured as made
 from tests.commands import ROOT, told

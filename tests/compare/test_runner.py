@@ -37,7 +37,8 @@ def test_errors_order_creep_and_cost():
     assert found.cost >= 0
     assert run(CASES["growing-pull"], Exact()).skipped == "no forces"
     # Steps between which samples lie.
-    assert run(CASES["sphere-rolls-down"], "compare.adapters.mujoco_free:defaults", [3e-3]).passed
+    defaults = "compare.engines.adapters.mujoco_free:defaults"
+    assert run(CASES["sphere-rolls-down"], defaults, [3e-3]).passed
 
 
 @pytest.mark.parametrize(
@@ -49,7 +50,7 @@ def test_errors_order_creep_and_cost():
             SimpleNamespace(build=print, step=print),
             "SimpleNamespace has no function state; an engine has build, step",
         ),
-        ("compare.adapters.mujoco_free:gone", " has no attribute 'gone' (mujoco "),
+        ("compare.engines.adapters.mujoco_free:gone", " has no attribute 'gone' (mujoco "),
         (Exact(PRECISION="f128"), "PRECISION = 'f128' must be one of f64, f32"),
     ],
 )

@@ -16,8 +16,8 @@ from unittest import mock
 import pytest
 
 import mjsim
+from compare.campaign.stops import SIGNALS
 from compare.commands import cli, signals, simulate
-from compare.stops import SIGNALS
 from model import Parameters
 from tests.commands import COMMANDS, ROOT, carried_out, python, started
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import analytic
-from compare.kit import steady
+from compare.view import steady
 from model import Parameters, State
 from tests.commands import carried_out, told
 

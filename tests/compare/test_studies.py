@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from compare.kit import pages
+from compare.figures import pages
 from docs.studies import friction, scenes, settings, speed, statements, tables
 from mjsim import ContactSettings, RigidContacts
 from model import InputError

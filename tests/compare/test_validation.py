@@ -7,14 +7,13 @@ import threading
 import pytest
 
 from compare import validation
-from compare.claim import Criterion, Outcome, Verdict
-from compare.kit import programme, record
-from compare.kit.engines import EVENT, MUJOCO
-from compare.kit.levels import Level
-from compare.kit.plan import ONE_BALL, PLAN, Entry
-from compare.kit.programme import UNDAMPED, Job, Protocol
-from compare.kit.record import Check, Missing, Records
+from compare.engines.study import EVENT, MUJOCO
+from compare.method import record
+from compare.method.protocol import UNDAMPED, Job, Protocol, carry_out, lacking
+from compare.method.record import Check, Missing, Records
+from compare.plan import ONE_BALL, PLAN, Entry, Level
 from compare.report import results
+from compare.verification.claim import Criterion, Outcome, Verdict
 from model import Parameters, StorageError
 from tests.commands import carried_out
 from tests.measured import claim, measured
@@ -182,7 +181,7 @@ def found_by(tmp_path, runner, monkeypatch):
 
     def found_by(measure, sets, entry, name="round"):
         monkeypatch.setitem(PLAN, name, entry)
-        return programme.carry_out(Job(Protocol(name, measure), runner, tmp_path, sets), Records())
+        return carry_out(Job(Protocol(name, measure), runner, tmp_path, sets), Records())
 
     return found_by
 
@@ -221,9 +220,9 @@ def test_numbers_that_are_planned_and_do_not_come_are_counted(runner, tmp_path, 
 
     monkeypatch.setitem(PLAN, "round", Entry(("reference", "blunt"), numbers=5))
     job = Job(Protocol("round", measure), runner, tmp_path)
-    assert programme.carry_out(job, Records()).lost == {("round", "reference", ""): 2}
+    assert carry_out(job, Records()).lost == {("round", "reference", ""): 2}
     monkeypatch.setitem(PLAN, "round", Entry(("reference",), only=ALONE, numbers=20))
-    assert programme.lacking(job, [Missing("round", "own", "why", 19)]).total() == 1
+    assert lacking(job, [Missing("round", "own", "why", 19)]).total() == 1
 
 
 ALONE = "it is that of the reference"

@@ -7,8 +7,9 @@ import numba
 import pytest
 
 import analytic
+from compare.campaign import compiling, progress, workers
 from compare.commands import simulate, waiting
-from compare.kit import collection, compiling, progress, workers
+from compare.view import collection
 from model import Parameters, table
 from tests.commands import carried_out
 

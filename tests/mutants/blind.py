@@ -23,20 +23,20 @@ import numpy as np
 
 import analytic
 from compare import validation
-from compare.assessment import full_verdict
-from compare.catalogue import CLAIMS
-from compare.claim import EngineVerdict, Outcome, Verdict
-from compare.judge import forget
-from compare.kit import pages
-from compare.kit.campaign import Campaign
-from compare.kit.engines import ENGINES, MUJOCO, PLAIN, Engine
-from compare.kit.levels import HIGH, LOW, Level
-from compare.kit.pages import Rows
-from compare.kit.progress import ValidationProgress, show_nothing
-from compare.kit.record import RecordsByEngine
-from compare.kit.workers import LateError, at_most
+from compare.campaign.campaign import Campaign
+from compare.campaign.progress import ValidationProgress, show_nothing
+from compare.campaign.workers import LateError, at_most
+from compare.engines.study import ENGINES, MUJOCO, PLAIN, Engine
+from compare.figures import pages
+from compare.figures.pages import Rows
+from compare.method.record import RecordsByEngine
+from compare.plan import HIGH, LOW, Level
 from compare.report.deviations import distribution
 from compare.report.results import RUNS
+from compare.subjects.catalogue import CLAIMS
+from compare.verification.assessment import full_verdict
+from compare.verification.claim import EngineVerdict, Outcome, Verdict
+from compare.verification.judge import forget
 from docs.studies import tables
 from model import Parameters
 from model.files import make_directory, write_text

@@ -13,7 +13,7 @@ from unittest import mock
 import mujoco
 
 import mjsim
-from compare.kit.engines import MUJOCO, Engine
+from compare.engines.study import MUJOCO, Engine
 from mjsim import ContactSettings, RigidContacts, scene
 from mjsim.contact_settings import ContactModel
 from model import Parameters

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from analytic.simulation import compiling
-from compare.kit.levels import Level
+from compare.plan import Level
 from tests.by_scipy import runs_by_scipy
 
 Function = Callable[..., Any]

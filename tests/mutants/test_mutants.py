@@ -16,14 +16,14 @@ import pytest
 
 import analytic
 from analytic.stationary import solutions as stationary
-from compare.adapters.free import Library
-from compare.claim import Outcome
-from compare.kit import pages
-from compare.kit.campaign import Campaign
-from compare.kit.engines import ENGINES, MUJOCO
-from compare.kit.levels import Level
-from compare.kit.runner import Runner
+from compare.campaign.campaign import Campaign
+from compare.engines.adapters.free import Library
+from compare.engines.study import ENGINES, MUJOCO
+from compare.figures import pages
+from compare.method.runner import Runner
+from compare.plan import Level
 from compare.subjects.stationary import claims
+from compare.verification.claim import Outcome
 from docs.studies import mutants
 from model import Case, Parameters
 from tests.mutants import blind, formulas, trial
@@ -68,7 +68,7 @@ def test_a_function_that_is_noted_answers_as_before() -> None:
 
 @pytest.mark.parametrize("wrong", WRONG_ENGINES, ids=lambda wrong: wrong.name)
 def test_a_wrong_engine_moves_otherwise_and_does_not_say_so(wrong, tmp_path, monkeypatch):
-    monkeypatch.setattr("compare.kit.engines.ENGINES", dict(ENGINES) | {wrong.name: wrong})
+    monkeypatch.setattr("compare.engines.study.ENGINES", dict(ENGINES) | {wrong.name: wrong})
     start, runs = [0.02, 0.0, 14.0, -1.0, 2.0, 7.0, 0.0, 0.0], {}
     with Campaign(tmp_path, workers=0) as campaign:
         for engine in (MUJOCO, wrong):
@@ -122,7 +122,7 @@ def test_a_round_is_played_by_a_seed(tmp_path, monkeypatch):
     engines that are asked beside MuJoCo one is there, and the page says so."""
     there = dataclasses.replace(MUJOCO, name="siconos", divisors=(1, 2, 4))
     absent = dataclasses.replace(
-        ENGINES["drake"], needs=Library("no-such-library", "compare.adapters.drake")
+        ENGINES["drake"], needs=Library("no-such-library", "compare.engines.adapters.drake")
     )
     monkeypatch.setitem(ENGINES, "siconos", there)
     monkeypatch.setitem(ENGINES, "drake", absent)

@@ -18,7 +18,7 @@ from analytic.mechanics import rolling_forces
 from analytic.mechanics.drag import DragLaw
 from analytic.simulation.equations import System
 from analytic.slipping import slip_bounds
-from compare.kit.levels import Level
+from compare.plan import Level
 from model import Case, Flow, Parameters, State
 from model.drag import STOKES
 from tests.mutants.exchange import Fault, Function, WrongTheory, faulty

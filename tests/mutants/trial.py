@@ -14,15 +14,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from compare import validation
-from compare.assessment import full_verdict
-from compare.catalogue import CLAIMS
-from compare.claim import Claim, Outcome
-from compare.judge import forget, verdict
-from compare.kit import levels
-from compare.kit.engines import ENGINES
-from compare.kit.record import Records
-from compare.kit.workers import LateError, at_most, processes
+from compare.campaign.workers import LateError, at_most, processes
+from compare.engines.study import ENGINES
+from compare.method.record import Records
+from compare.plan import Level
 from compare.report import results
+from compare.subjects.catalogue import CLAIMS
+from compare.verification.assessment import full_verdict
+from compare.verification.claim import Claim, Outcome
+from compare.verification.judge import forget, verdict
 from tests.mutants.engines import WRONG_ENGINES
 from tests.mutants.exchange import WrongTheory, believed, noting
 from tests.mutants.theories import THEORIES
@@ -156,7 +156,7 @@ def _outcome(directory: Path, by: str, claim: Claim) -> Outcome:
 
 def _theory(directory: Path, by: str, whole: bool, right: Sequence[Right], number: int) -> Trial:
     wrong, noticed, hung = THEORIES[number], Outcomes(), list[str]()
-    if wrong.level > levels.Level[results.load(directory).level]:
+    if wrong.level > Level[results.load(directory).level]:
         return Trial(wrong.what, noticed, tried=False)
     asked = [pair for pair in zip(CLAIMS, right, strict=True) if name_of(wrong) in pair[1].calls]
     forget()
@@ -178,7 +178,7 @@ def _engine(directory: Path, number: int) -> Trial:
     wrong, apart = WRONG_ENGINES[number], directory / "wrong-engines" / f"{number}"
     claims = [claim.id for claim in CLAIMS if claim.protocols and claim.protocols <= PROVING]
     verdicts = validation.validate(
-        apart, level=levels.Level.QUICK, claims=claims, engine=wrong, workers=0, report=False
+        apart, level=Level.QUICK, claims=claims, engine=wrong, workers=0, report=False
     )
     other = {
         v.claim.id: v.outcome for v in verdicts if v.outcome is not _outcome(directory, "", v.claim)

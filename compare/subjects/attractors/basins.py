@@ -18,11 +18,11 @@ import numpy.typing as npt
 import analytic
 from analytic import Settings
 from analytic.simulation.settings import start_state
-from compare.kit.campaign import Campaign
-from compare.kit.engines import MUJOCO
-from compare.kit.statistics import hops_on
-from compare.kit.sweep import Axis, check_size
-from compare.kit.tasks import Task
+from compare.campaign.campaign import Campaign
+from compare.campaign.sweep import Axis, check_size
+from compare.campaign.tasks import Task
+from compare.engines.study import MUJOCO
+from compare.method.statistics import hops_on
 from mjsim import RigidContacts
 from model import Case, Contact, InputError, Parameters, State
 from model.arrays import Array

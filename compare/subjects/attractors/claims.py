@@ -12,13 +12,13 @@ from analytic.orbits import orbit_branch
 from analytic.orbits import periodic as orbits
 from analytic.orbits.orbit_branch import Bifurcation
 from analytic.orbits.periodic import Orbit
-from compare.claim import Criterion, claim, criteria
-from compare.judge import simulated, theory
-from compare.kit.levels import Level
-from compare.kit.record import Measurement, state
-from compare.kit.statistics import hops
-from compare.states import solution_of
+from compare.method.record import Measurement, state
+from compare.method.statistics import hops
+from compare.plan import Level
 from compare.subjects.attractors.measure import TOP
+from compare.verification.claim import Criterion, claim, criteria
+from compare.verification.judge import simulated, theory
+from compare.verification.states import solution_of
 
 _REFINED = "analytic.orbits.periodic.refine"
 _PERIODIC = "Section 5.3, last paragraph"

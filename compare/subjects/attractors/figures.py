@@ -17,9 +17,16 @@ from analytic.bifurcation import diagram as bifurcation
 from analytic.orbits import orbit_branch
 from analytic.orbits import periodic as orbits
 from analytic.orbits.orbit_branch import Bifurcation
-from compare.branches import Drawn, check_thresholds, round_with_fluid, slipping, spin, spin_of
-from compare.kit import style
-from compare.kit.drawing import Diagram, GapError, diagram
+from compare.figures import style
+from compare.figures.branches import (
+    Drawn,
+    check_thresholds,
+    round_with_fluid,
+    slipping,
+    spin,
+    spin_of,
+)
+from compare.figures.drawing import Diagram, GapError, diagram
 from compare.subjects.attractors.basins import ATTRACTORS, Basins
 from model import Case, Contact, Parameters, State
 

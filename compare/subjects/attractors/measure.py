@@ -24,16 +24,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compare.kit.conditions import Conditions, state_of
-from compare.kit.engines import MOREAU
-from compare.kit.programme import Protocol
-from compare.kit.quantities import QUANTITIES
-from compare.kit.record import Measured, Records, Sets, if_found
-from compare.kit.runner import Runner, coarse_step
-from compare.kit.scales import time_unit
-from compare.kit.settling import settled_readings
-from compare.kit.statistics import Estimate, estimate, hops, peaks, settled_case, tail, top
-from compare.kit.step_pairs import (
+from compare.campaign.sweep import sobol
+from compare.campaign.tasks import Task
+from compare.engines.study import MOREAU
+from compare.method.conditions import Conditions, state_of
+from compare.method.protocol import Protocol
+from compare.method.quantities import QUANTITIES
+from compare.method.record import Measured, Records, Sets, if_found
+from compare.method.runner import Runner, coarse_step
+from compare.method.scales import time_unit
+from compare.method.settling import settled_readings
+from compare.method.statistics import Estimate, estimate, hops, peaks, settled_case, tail, top
+from compare.method.step_pairs import (
     Start,
     StepPair,
     at_zero_step,
@@ -41,8 +43,6 @@ from compare.kit.step_pairs import (
     constrained,
     of_no_order,
 )
-from compare.kit.sweep import sobol
-from compare.kit.tasks import Task
 from model import Case, Flow, Parameters, State, Trajectory
 from model.arrays import Array
 

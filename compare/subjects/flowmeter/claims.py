@@ -11,12 +11,13 @@ import numpy as np
 import analytic
 from analytic.flowmeter import design
 from analytic.flowmeter.characteristic import End
-from compare.claim import Criterion, Text, When, all_of, claim, criteria, given
-from compare.judge import integrated, simulated, theory
-from compare.kit.record import Measurement, state
-from compare.kit.settling import physical_case
-from compare.kit.statistics import Estimate
-from compare.states import (
+from compare.method.record import Measurement, state
+from compare.method.settling import physical_case
+from compare.method.statistics import Estimate
+from compare.subjects.flowmeter.measure import BY_SPIN, UNLOADED, UPWARDS, first_top
+from compare.verification.claim import Criterion, Text, When, all_of, claim, criteria, given
+from compare.verification.judge import integrated, simulated, theory
+from compare.verification.states import (
     case_of,
     from_floor,
     is_in,
@@ -26,7 +27,6 @@ from compare.states import (
     solution_of,
     solutions,
 )
-from compare.subjects.flowmeter.measure import BY_SPIN, UNLOADED, UPWARDS, first_top
 from model import Case, Contact, Trajectory
 from model.drag import QUADRATIC, STOKES
 

@@ -14,11 +14,19 @@ import analytic
 from analytic.bifurcation import diagram as bifurcation
 from analytic.flowmeter.design import THRESHOLDS, Design
 from analytic.simulation import simulator
-from compare.branches import check_thresholds, fold_state, slipping, stable_ends
-from compare.kit import style
-from compare.kit.drawing import Diagram, Drawing, Evidence, GapError, diagram, only_where, warn_of
-from compare.kit.engines import EVENT
-from compare.kit.record import Measurement
+from compare.engines.study import EVENT
+from compare.figures import style
+from compare.figures.branches import check_thresholds, fold_state, slipping, stable_ends
+from compare.figures.drawing import (
+    Diagram,
+    Drawing,
+    Evidence,
+    GapError,
+    diagram,
+    only_where,
+    warn_of,
+)
+from compare.method.record import Measurement
 from compare.subjects.flowmeter.measure import UNLOADED
 from model import Case, Contact, Parameters
 

@@ -22,16 +22,16 @@ from itertools import pairwise
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from compare.kit import settling
-from compare.kit.conditions import Conditions, state_of
-from compare.kit.programme import Protocol
-from compare.kit.record import Measured, Measurement, Records, Sets, if_found
-from compare.kit.runner import Runner, coarse_step
-from compare.kit.scales import time_unit
-from compare.kit.settling import SettlingCriteria, SteadyState
-from compare.kit.statistics import Estimate, estimate, settled_case, uniform
-from compare.kit.step_pairs import Start, StepPair, StepPairResult, carry_out
-from compare.kit.tasks import Task
+from compare.campaign.tasks import Task
+from compare.method import settling
+from compare.method.conditions import Conditions, state_of
+from compare.method.protocol import Protocol
+from compare.method.record import Measured, Measurement, Records, Sets, if_found
+from compare.method.runner import Runner, coarse_step
+from compare.method.scales import time_unit
+from compare.method.settling import SettlingCriteria, SteadyState
+from compare.method.statistics import Estimate, estimate, settled_case, uniform
+from compare.method.step_pairs import Start, StepPair, StepPairResult, carry_out
 from model import Case, Flow, Parameters, State, Trajectory
 from model.trajectory import columns
 

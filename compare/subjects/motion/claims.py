@@ -12,14 +12,14 @@ from analytic.flowmeter import real_fluid
 from analytic.mechanics import drag
 from analytic.slipping import slip_stability
 from analytic.slipping.slip_stability import SlipStability
-from compare.claim import Criterion, Text, claim, criteria, given
-from compare.judge import RTOL, integrated, simulated, theory
-from compare.kit.quantities import quantity
-from compare.kit.record import Measurement, state
-from compare.kit.settling import forces
-from compare.kit.statistics import Estimate
-from compare.states import exists
+from compare.method.quantities import quantity
+from compare.method.record import Measurement, state
+from compare.method.settling import forces
+from compare.method.statistics import Estimate
 from compare.subjects.motion.measure import LANDED, late_ramp
+from compare.verification.claim import Criterion, Text, claim, criteria, given
+from compare.verification.judge import RTOL, integrated, simulated, theory
+from compare.verification.states import exists
 from model import Case, Trajectory
 from model.cases import TRAITS
 from model.drag import STOKES

@@ -38,15 +38,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compare.kit.conditions import Conditions, state_of
-from compare.kit.conditions import FluidConditions as Fluid
-from compare.kit.programme import Protocol
-from compare.kit.record import Found, Measured, Records, Sets
-from compare.kit.runner import Runner, coarse_step
-from compare.kit.scales import time_unit
-from compare.kit.settling import PRESSES, forces, settled_readings
-from compare.kit.statistics import Estimate, estimate, uniform
-from compare.kit.step_pairs import (
+from compare.campaign.tasks import Task
+from compare.method.conditions import Conditions, state_of
+from compare.method.conditions import FluidConditions as Fluid
+from compare.method.protocol import Protocol
+from compare.method.record import Found, Measured, Records, Sets
+from compare.method.runner import Runner, coarse_step
+from compare.method.scales import time_unit
+from compare.method.settling import PRESSES, forces, settled_readings
+from compare.method.statistics import Estimate, estimate, uniform
+from compare.method.step_pairs import (
     HALF_WINDOW,
     STEP_RATIO,
     SURER,
@@ -61,7 +62,6 @@ from compare.kit.step_pairs import (
     random_state,
     unlike,
 )
-from compare.kit.tasks import Task
 from model import Case, Contact, Flow, Parameters, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS

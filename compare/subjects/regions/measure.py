@@ -25,14 +25,14 @@ from itertools import islice, zip_longest
 import numpy as np
 from scipy.spatial import Delaunay
 
-from compare.kit.brackets import Attempt, Bracket, Search, narrow
-from compare.kit.conditions import Conditions
-from compare.kit.levels import Level
-from compare.kit.programme import Protocol
-from compare.kit.record import Found, Measured, Measurement, Missing, Records, Sets, if_found
-from compare.kit.runner import Runner, coarse_step
-from compare.kit.scales import time_unit
-from compare.kit.settling import (
+from compare.campaign.tasks import Task
+from compare.method.brackets import Attempt, Bracket, Search, narrow
+from compare.method.conditions import Conditions
+from compare.method.protocol import Protocol
+from compare.method.record import Found, Measured, Measurement, Missing, Records, Sets, if_found
+from compare.method.runner import Runner, coarse_step
+from compare.method.scales import time_unit
+from compare.method.settling import (
     SettlingCriteria,
     initial_condition,
     physical_case,
@@ -40,7 +40,7 @@ from compare.kit.settling import (
     settle_groups,
     starts_at,
 )
-from compare.kit.statistics import (
+from compare.method.statistics import (
     COVERAGE,
     Estimate,
     estimate,
@@ -50,8 +50,8 @@ from compare.kit.statistics import (
     tail,
     taper,
 )
-from compare.kit.step_pairs import constrained
-from compare.kit.tasks import Task
+from compare.method.step_pairs import constrained
+from compare.plan import Level
 from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
 from model.drag import QUADRATIC

@@ -12,9 +12,9 @@ import analytic
 from analytic.slipping import slip_bounds, slip_stability
 from analytic.slipping.slip_bounds import HeldBound, SlipBound
 from analytic.slipping.slip_stability import SlipStability
-from compare.claim import Criterion, Outcome, Text, When, all_of, claim, given
-from compare.judge import simulated
-from compare.kit.record import Measurement, Relation, state
+from compare.method.record import Measurement, Relation, state
+from compare.verification.claim import Criterion, Outcome, Text, When, all_of, claim, given
+from compare.verification.judge import simulated
 from model import Case
 from model.arrays import Array
 from model.kinematics import SLIP_XYZ, VARIABLES

@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 
 from analytic.bifurcation.diagram import thresholds
 from analytic.simulation import simulator
-from compare.branches import check_thresholds
-from compare.kit import style
-from compare.kit.drawing import Diagram, diagram
+from compare.figures import style
+from compare.figures.branches import check_thresholds
+from compare.figures.drawing import Diagram, diagram
 from model import Case
 
 BETA = 0.9

@@ -28,14 +28,15 @@ from typing import Unpack
 
 import numpy as np
 
-from compare.kit.brackets import Attempt, Bracket, Search, narrow
-from compare.kit.conditions import Conditions, state_of
-from compare.kit.programme import Protocol
-from compare.kit.record import Measured, Measurement, Missing, Records, Sets, if_found
-from compare.kit.runner import Runner, coarse_step
-from compare.kit.scales import dragged_speed, slip_unit, time_unit
-from compare.kit.settling import settle_groups, starts_at
-from compare.kit.statistics import (
+from compare.campaign.tasks import Task
+from compare.method.brackets import Attempt, Bracket, Search, narrow
+from compare.method.conditions import Conditions, state_of
+from compare.method.protocol import Protocol
+from compare.method.record import Measured, Measurement, Missing, Records, Sets, if_found
+from compare.method.runner import Runner, coarse_step
+from compare.method.scales import dragged_speed, slip_unit, time_unit
+from compare.method.settling import settle_groups, starts_at
+from compare.method.statistics import (
     Estimate,
     estimate,
     extrapolated_zero,
@@ -44,7 +45,7 @@ from compare.kit.statistics import (
     uniform,
     zero_and_slope,
 )
-from compare.kit.step_pairs import (
+from compare.method.step_pairs import (
     DOUBT,
     EXTRAPOLATION,
     HALF_WINDOW,
@@ -56,7 +57,6 @@ from compare.kit.step_pairs import (
     polynomials,
     random_state,
 )
-from compare.kit.tasks import Task
 from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
 from model.drag import STOKES

@@ -9,11 +9,11 @@ import numpy as np
 import analytic
 from analytic import StationarySolution
 from analytic.mechanics import dynamics
-from compare.claim import Criterion, Text, claim, given
-from compare.judge import theory
-from compare.kit.record import Measurement
-from compare.states import thresholds_of
+from compare.method.record import Measurement
 from compare.subjects.stability.measure import natural_size
+from compare.verification.claim import Criterion, Text, claim, given
+from compare.verification.judge import theory
+from compare.verification.states import thresholds_of
 from model import Case, Parameters, State
 from model.arrays import Array
 from model.cases import TRAITS

@@ -27,15 +27,16 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from compare.kit.conditions import Conditions, state_of
-from compare.kit.engines import STUDY_SLIP
-from compare.kit.programme import Protocol
-from compare.kit.quantities import quantity
-from compare.kit.record import Found, Measured, Measurement, Missing, Records, Sets
-from compare.kit.runner import Runner, coarse_step
-from compare.kit.scales import time_unit
-from compare.kit.settling import SPIN, is_well_known, physical_case, safe_height
-from compare.kit.statistics import (
+from compare.campaign.tasks import Task
+from compare.engines.study import STUDY_SLIP
+from compare.method.conditions import Conditions, state_of
+from compare.method.protocol import Protocol
+from compare.method.quantities import quantity
+from compare.method.record import Found, Measured, Measurement, Missing, Records, Sets
+from compare.method.runner import Runner, coarse_step
+from compare.method.scales import time_unit
+from compare.method.settling import SPIN, is_well_known, physical_case, safe_height
+from compare.method.statistics import (
     COVERAGE,
     Estimate,
     estimate,
@@ -45,8 +46,7 @@ from compare.kit.statistics import (
     propagator_error,
     uniform,
 )
-from compare.kit.step_pairs import Start, unlike
-from compare.kit.tasks import Task
+from compare.method.step_pairs import Start, unlike
 from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS

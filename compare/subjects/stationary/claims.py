@@ -10,11 +10,11 @@ from analytic.bifurcation import diagram as bifurcation
 from analytic.bifurcation.diagram import Exists
 from analytic.mechanics import drag
 from analytic.stationary import slipping_branch
-from compare.claim import Criterion, Text, When, all_of, claim, criteria, given
-from compare.judge import theory
-from compare.kit.record import Measurement, Relation
-from compare.kit.settling import FORCES, SUMS
-from compare.states import (
+from compare.method.record import Measurement, Relation
+from compare.method.settling import FORCES, SUMS
+from compare.verification.claim import Criterion, Text, When, all_of, claim, criteria, given
+from compare.verification.judge import theory
+from compare.verification.states import (
     case_of,
     exists,
     from_floor,

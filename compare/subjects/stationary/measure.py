@@ -13,16 +13,16 @@ from typing import Self
 
 import numpy as np
 
-from compare.kit import settling
-from compare.kit.conditions import Conditions
-from compare.kit.programme import Protocol
-from compare.kit.quantities import quantity
-from compare.kit.record import Measured, Measurement, Missing, Records, Sets
-from compare.kit.runner import Runner
-from compare.kit.scales import time_unit
-from compare.kit.settling import SettlingCriteria, SteadyState
-from compare.kit.statistics import Estimate
-from compare.kit.step_pairs import Start, unlike
+from compare.method import settling
+from compare.method.conditions import Conditions
+from compare.method.protocol import Protocol
+from compare.method.quantities import quantity
+from compare.method.record import Measured, Measurement, Missing, Records, Sets
+from compare.method.runner import Runner
+from compare.method.scales import time_unit
+from compare.method.settling import SettlingCriteria, SteadyState
+from compare.method.statistics import Estimate
+from compare.method.step_pairs import Start, unlike
 from model import Case, State
 from model.drag import QUADRATIC
 

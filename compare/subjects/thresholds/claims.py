@@ -13,10 +13,10 @@ import analytic
 from analytic.bifurcation import diagram as bifurcation
 from analytic.mechanics import rolling_forces, roots
 from analytic.stationary import slipping_branch
-from compare.claim import Criterion, When, claim, criteria, given
-from compare.judge import theory
-from compare.kit.record import Measurement, Relation
-from compare.states import thresholds_of, value_in
+from compare.method.record import Measurement, Relation
+from compare.verification.claim import Criterion, When, claim, criteria, given
+from compare.verification.judge import theory
+from compare.verification.states import thresholds_of, value_in
 from model import Case, Parameters
 from model.arrays import Real
 

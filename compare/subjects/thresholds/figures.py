@@ -19,11 +19,18 @@ from scipy import ndimage
 from analytic.bifurcation import diagram as bifurcation
 from analytic.bifurcation.diagram import Exists
 from analytic.stationary import slipping_branch
-from compare.branches import check_thresholds, fold_state, round_with_fluid, slipping, spin, spin_of
-from compare.kit import style
-from compare.kit.drawing import Diagram, Drawing, Evidence, GapError, diagram, only_where
-from compare.kit.record import Measurement
-from compare.kit.style import STABLE, UNSTABLE, Line, Place
+from compare.figures import style
+from compare.figures.branches import (
+    check_thresholds,
+    fold_state,
+    round_with_fluid,
+    slipping,
+    spin,
+    spin_of,
+)
+from compare.figures.drawing import Diagram, Drawing, Evidence, GapError, diagram, only_where
+from compare.figures.style import STABLE, UNSTABLE, Line, Place
+from compare.method.record import Measurement
 from model import Case, Parameters, State
 from model.arrays import Array
 

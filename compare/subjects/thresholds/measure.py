@@ -24,15 +24,16 @@ from typing import Unpack
 
 import numpy as np
 
-from compare.kit import settling
-from compare.kit.brackets import Answer, Attempt, Bracket, Search, narrow
-from compare.kit.conditions import Conditions
-from compare.kit.engines import sliding_speeds
-from compare.kit.programme import Protocol
-from compare.kit.record import Measured, Measurement, Missing, Records, Sets
-from compare.kit.runner import Runner, coarse_step
-from compare.kit.settling import PRESSES, SettlingCriteria, SteadyState, physical_case
-from compare.kit.statistics import (
+from compare.campaign.tasks import Task
+from compare.engines.study import sliding_speeds
+from compare.method import settling
+from compare.method.brackets import Answer, Attempt, Bracket, Search, narrow
+from compare.method.conditions import Conditions
+from compare.method.protocol import Protocol
+from compare.method.record import Measured, Measurement, Missing, Records, Sets
+from compare.method.runner import Runner, coarse_step
+from compare.method.settling import PRESSES, SettlingCriteria, SteadyState, physical_case
+from compare.method.statistics import (
     COVERAGE,
     POINTS,
     Estimate,
@@ -41,7 +42,6 @@ from compare.kit.statistics import (
     settled_case,
     tail,
 )
-from compare.kit.tasks import Task
 from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
 

@@ -8,12 +8,12 @@ from functools import partial
 
 import analytic
 from analytic.flowmeter import pulsation, response
-from compare.claim import Criterion, claim, criteria, given
-from compare.judge import integrated, simulated, theory
-from compare.kit.record import Measurement, Relation, state
-from compare.kit.statistics import Estimate
-from compare.states import lifts_first, slips_first
+from compare.method.record import Measurement, Relation, state
+from compare.method.statistics import Estimate
 from compare.subjects.unsteady.measure import caught_up
+from compare.verification.claim import Criterion, claim, criteria, given
+from compare.verification.judge import integrated, simulated, theory
+from compare.verification.states import lifts_first, slips_first
 from model import Case, Flow
 from model.drag import STOKES
 

@@ -15,10 +15,10 @@ from matplotlib.ticker import LogLocator, NullFormatter
 import analytic
 from analytic.bifurcation import diagram as bifurcation
 from analytic.flowmeter import pulsation, response
-from compare.branches import check_thresholds, slipping, stable_ends
-from compare.kit import style
-from compare.kit.drawing import Diagram, Evidence, GapError, diagram, only_where
-from compare.kit.record import Measurement
+from compare.figures import style
+from compare.figures.branches import check_thresholds, slipping, stable_ends
+from compare.figures.drawing import Diagram, Evidence, GapError, diagram, only_where
+from compare.method.record import Measurement
 from compare.subjects.unsteady.measure import RAMP, ROLLS_AT, caught_up, odd_part
 from model import Case, Flow, Parameters
 from model.arrays import Array

@@ -24,15 +24,16 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import Polynomial
 
-from compare.kit.brackets import Attempt, Bracket, Search, narrow
-from compare.kit.conditions import Conditions, state_of
-from compare.kit.programme import Protocol
-from compare.kit.quantities import QUANTITIES
-from compare.kit.record import Measured, Measurement, Missing, Records, Sets, if_found
-from compare.kit.runner import Runner, coarse_step
-from compare.kit.settling import rounded_duration, settle
-from compare.kit.statistics import COVERAGE, Estimate, estimate, peaks, top, uniform
-from compare.kit.step_pairs import (
+from compare.campaign.tasks import Task
+from compare.method.brackets import Attempt, Bracket, Search, narrow
+from compare.method.conditions import Conditions, state_of
+from compare.method.protocol import Protocol
+from compare.method.quantities import QUANTITIES
+from compare.method.record import Measured, Measurement, Missing, Records, Sets, if_found
+from compare.method.runner import Runner, coarse_step
+from compare.method.settling import rounded_duration, settle
+from compare.method.statistics import COVERAGE, Estimate, estimate, peaks, top, uniform
+from compare.method.step_pairs import (
     Start,
     StepPair,
     StepPairResult,
@@ -41,7 +42,6 @@ from compare.kit.step_pairs import (
     constrained,
     of_no_order,
 )
-from compare.kit.tasks import Task
 from model import Case, Contact, Flow, Parameters, State, Trajectory
 from model.arrays import Array
 from model.drag import STOKES

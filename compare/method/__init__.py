@@ -1,0 +1,1 @@
+"""How it is measured: protocols, settling, brackets, step pairs; numbers with uncertainties."""
