@@ -108,7 +108,7 @@ def read(
     except OSError as error:
         raise StorageError(f"cannot read {path}: {error.strerror}") from error
     except UnicodeDecodeError as error:
-        raise InputError(f"{path} is not a text file: {error.reason}") from error
+        raise InputError(f"{path} is not a text file in UTF-8") from error
     if len(text) > LONGEST:
         raise StorageError(f"cannot read {path}: it has more than {LONGEST / 1e6:g} MB")
     lines = text.splitlines()

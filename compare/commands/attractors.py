@@ -34,7 +34,6 @@ def run(args: argparse.Namespace) -> int:
     axes, ways = map(Axis.several, (args.vary, args.follow))
     ranges = {way.name: way.ends for way in ways}
     sets = list(grid(options.parameters(args), axes))
-    options.warn_of_model(sets[0], sets[-1])
     rows = []
     for k, p in enumerate(sets):
 
@@ -51,6 +50,7 @@ def run(args: argparse.Namespace) -> int:
         varied: dict[str, Any] = {axis.name: getattr(p, axis.name) for axis in axes}
         attracting, born = list(map(attractor_data, found)), list(map(branch_data, branches))
         rows.append(varied | {"attractors": attracting, "branches": born})
+    options.warn_of_model(sets[0], sets[-1])
     data = plain({"engine": args.engine.name, "seed": args.seed, "sets": rows})
     table = _table(data)
     if args.page:
@@ -220,7 +220,6 @@ def _largest(row: dict[str, Any]) -> float:
 def run_basins(args: argparse.Namespace) -> int:
     """Map the basins of attraction over a plane of starts, and show their shares."""
     p, start = options.parameters(args), running.start(args)
-    options.warn_of_model(p)
     units = dict(zip(VARIABLES, UNITS, strict=True))
     across, up = (Axis.parse(text, units, "state variable") for text in (args.across, args.up))
     for name in (across.name, up.name):
@@ -228,6 +227,7 @@ def run_basins(args: argparse.Namespace) -> int:
             raise InputError(f"--start {name} has no effect: {name} spans the plane")
     with running.campaign(args, "basins") as campaign:
         mapped = basins(campaign, p, start._asdict(), (across, up), args.mujoco, args.timestep)
+    options.warn_of_model(p)
     if args.map and args.map.suffix.lower() in drawing.SUFFIXES:
         # here, because drawing takes a second to load
         from compare.subjects.attractors import figures

@@ -108,7 +108,9 @@ def _refuses_to_load(error: Exception) -> str:
 
 
 def _ended(code: int, said: str) -> int:
-    """Say why a command ended with an exit code, and return that."""
+    """Say in a line why a command ended with an exit code, and return that."""
+    # the name of a file may hold a line's end, or what a terminal obeys
+    said = "".join(each if each.isprintable() else ascii(each)[1:-1] for each in said)
     with suppress(OSError):  # nobody reads it any more, as where the terminal is gone
         print(f"dualball: {said}", file=sys.stderr)
     return code

@@ -69,8 +69,10 @@ def inspect(args: argparse.Namespace) -> int:
 def _chain(args: argparse.Namespace) -> int:
     """Show the chain of a claim, with the numbers of a validation if there is one."""
     from compare import validation  # here, because it loads everything there is
-    from compare.report import chain
+    from compare.report import chain, results
 
+    if args.file:
+        results.load(args.file)  # else the chain would end without numbers, and not say why
     claim, verdict, summary = validation.told(args.claim, args.file or Path("results"))
     found = chain.links(claim, verdict, summary)
     options.show(chain.described(found), args.json, *chain.shown(found))

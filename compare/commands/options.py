@@ -270,7 +270,7 @@ def warn_of_model(*sets: Parameters) -> None:
     from analytic.flowmeter import real_fluid  # here, because help needs none of it
     from compare.figures.validity import model_warning
 
-    for doubt in model_warning(max(map(real_fluid.model_error, sets))):
+    for doubt in model_warning(max(map(real_fluid.model_error, sets), default=0.0)):
         warn(doubt.removeprefix("Warning: "))
 
 

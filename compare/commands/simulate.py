@@ -42,8 +42,8 @@ def run(args: argparse.Namespace) -> int:
             f"{args.flow} begins at t = {flow.start[0]:.10g} s, but the run, from 0 on, ends at "
             f"{args.time:g} s: shift its times, or give a longer --time"
         )
-    options.warn_of_model(p)
     task = running.task(args, p, flow=flow)
+    _warn_of_model([task])
     with tempfile.TemporaryDirectory() as scratch:
         as_table = options.is_table(args.output)
         path = Path(scratch) / "run.h5" if as_table or not args.output else args.output
@@ -77,7 +77,7 @@ def run_sweep(args: argparse.Namespace) -> int:
     save = collection.save_means if args.means_only else storage.save_batch
     with running.campaign(args, "sweep", batch=args.batch, save=save) as work:
         _refuse_another_sweep(args, p)
-        options.warn_of_model(tasks[0].parameters, tasks[-1].parameters)
+        _warn_of_model([tasks[0], tasks[-1]])
         longest, slowest = steady.enough([each.parameters for each in tasks])
         if args.time < longest:
             options.warn(
@@ -97,6 +97,12 @@ def run_sweep(args: argparse.Namespace) -> int:
         for failure in failures:
             print(f"failed: {failure.task.key}: {failure.reason}", file=sys.stderr)
     return 1 if failures else 0
+
+
+def _warn_of_model(tasks: list[Task]) -> None:
+    """As `options.warn_of_model`, of runs that leave the fluid's torque out."""
+    sets = (each.parameters for each in tasks)
+    options.warn_of_model(*(p for p in sets if not p.fluid_torque))
 
 
 def _sweep_tasks(args: argparse.Namespace, p: Parameters) -> list[Task]:
