@@ -160,9 +160,26 @@ mjd_smooth_vel = _function("mjd_smooth_vel", arguments=3)
 # -- does it lie in memory as it is said? ----------------------------------------------------------
 
 
-def _view(item: Any, address: int, count: int = 1) -> Any:
-    """Items of a structured type at an address, as numpy shows them."""
-    return np.frombuffer((ctypes.c_char * (count * item.itemsize)).from_address(address), item)
+def _at(address: int, kind: np.dtype[Any]) -> Any:
+    """A structure at an address."""
+    memory: Any = (ctypes.c_char * kind.itemsize).from_address(address)
+    return np.frombuffer(memory, kind)[0]
+
+
+def _differs(there: Any, owner: Any) -> bool:
+    """Whether any number of a structure, or address of an array, isn't what an object of MuJoCo has
+    by the same name."""
+    for name in there.dtype.names:
+        value, found = getattr(owner, name, None), there[name]
+        if isinstance(found, np.void):
+            if _differs(found, value):
+                return True
+        elif isinstance(value, np.ndarray) and found.ndim == 0:
+            if found != value.ctypes.data:
+                return True
+        elif isinstance(value, (int, float, np.ndarray)) and not np.array_equal(found, value):
+            return True
+    return False
 
 
 def _check() -> None:
@@ -175,23 +192,14 @@ def _check() -> None:
     data = mujoco.MjData(model)
     data.time = 3.0
     mujoco.mj_forward(model, data)
-    m, d = _view(MJ_MODEL, model._address)[0], _view(MJ_DATA, data._address)[0]
-    if (d["time"], d["ncon"], d["nefc"], m["nv"], m["ngeom"]) == (3.0, 1, data.nefc, 6, 2):
-        c, option = _view(MJ_CONTACT, int(d["contact"]))[0], m["opt"]
-        rows = _view(np.dtype(np.float64), int(d["efc_aref"]), data.nefc)
-        places = _view(np.dtype(np.float64), int(d["geom_xpos"]), 6)
-        if (
-            (option["timestep"], option["gravity"][2]) == (0.0078125, -7.0)
-            and (option["cone"], option["solver"]) == (model.opt.cone, model.opt.solver)
-            and (c["dist"], c["dim"], c["efc_address"]) == (data.contact.dist[0], 4, 0)
-            and (c["geom"].tolist(), c["mu"]) == ([0, 1], data.contact.mu[0])
-            and np.array_equal(c["friction"], data.contact.friction[0])
-            and np.array_equal(rows, data.efc_aref)
-            and np.array_equal(places, data.geom_xpos.ravel())
-        ):
-            return
-    version = mujoco.__version__
-    raise ImportError(f"MuJoCo {version} doesn't lie in memory as its mujoco.introspect says")
+    first = data.contact.dist.ctypes.data  # dist is the first field
+    if (
+        _differs(_at(model._address, MJ_MODEL), model)
+        or _differs(_at(data._address, MJ_DATA), data)
+        or _differs(_at(first, MJ_CONTACT), data.contact[0])
+    ):
+        version = mujoco.__version__
+        raise ImportError(f"MuJoCo {version} doesn't lie in memory as its mujoco.introspect says")
 
 
 _check()
