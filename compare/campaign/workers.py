@@ -72,12 +72,16 @@ class Workers:
             for _ in range(2):
                 if self._closed:
                     raise CancelledError("the campaign was given up")
-                self._running = self._running or self.start()
                 try:
+                    self._running = self._running or self.start()
                     return self._running.submit(*call)
                 except self.lost:
+                    assert self._running
                     self.stop(self._running, True)
                     self._running = None
+                except OSError as error:  # the machine has no more of what they need
+                    why = f"workers can't be started: {error.strerror or error}"
+                    raise StorageError(f"{why}; --workers 0 does without") from error
         raise StorageError("workers die as soon as they are started")
 
     def map(self, one: Callable[[Any], Any], items: Iterable[Any]) -> Iterator[Any]:

@@ -56,6 +56,7 @@ def program() -> NoReturn:
     sys.exit(code)
 
 
+_FULL = errno.ENOSPC, errno.EFBIG, errno.EDQUOT
 MOST_SAID = 2000
 """Characters of a refusal, at most."""
 
@@ -79,12 +80,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # `program` sees to it
         return 0
     except OSError as error:  # the machine can't do it: of what a user named `StorageError` tells
-        full = "cannot write to standard output" if error.errno == errno.ENOSPC else ""
+        full = "cannot write to standard output" if error.errno in _FULL else ""
         said = [str(each) for each in (error.filename or full, error.strerror or error) if each]
         return _ended(2, f"error: {': '.join(said)}")
     except Exception as error:
         if library := _refuses_to_load(error):
             return _ended(2, f"error: {library} can't be loaded: {' '.join(str(error).split())}")
+        if isinstance(error, ImportError) and error.name is None:  # ours: it says why
+            return _ended(2, f"error: {error}")
         raise
     except KeyboardInterrupt as error:
         kept = ""

@@ -287,8 +287,9 @@ NOTES = {"sweep.json", "summary.json"}
 
 @contextmanager
 def nothing_left(args: argparse.Namespace) -> Iterator[None]:
-    """A context after which, if a command failed, directories are removed that it made for its
-    output, and notes in one that was empty or isn't there, if they hold nothing else."""
+    """A context after which, if a command failed, what it made for its output is removed in a
+    directory that was empty or wasn't there: empty directories, notes with nothing beside them, and
+    after a mistake all of what the same command wouldn't go on from."""
     output: Path | None = getattr(args, "output", None)
     new = [each for each in (output, *output.parents) if not each.exists()] if output else []
     filled = output is None or output.is_file() or (output.is_dir() and any(output.iterdir()))
@@ -301,7 +302,8 @@ def nothing_left(args: argparse.Namespace) -> Iterator[None]:
             with suppress(OSError):  # a library holds all handles
                 inner = sorted(output.rglob("*"), reverse=True)
         files = [each for each in inner if not each.is_dir()]
-        if {each.name for each in files} <= NOTES:
+        mistake = isinstance(error, OSError | InputError) and not args.resumes
+        if mistake or {each.name for each in files} <= NOTES:
             for each in files:
                 each.unlink()
         for each in [*inner, *new]:
@@ -364,7 +366,9 @@ def add_axes(
 
 def add_directory(parser: Parser, directory: str, *names: str) -> None:
     """Options of all commands that fill a directory: its name, and whether to show progress."""
-    where = "directory of the results; what it holds already is not computed again"
+    where = "directory of the results"
+    if parser.get_default("resumes"):
+        where += "; what it holds already is not computed again"
     names = names or ("-o", "--output")
     parser.add_argument(
         *names, dest="output", type=results, default=Path(directory), metavar="DIR", help=where

@@ -37,6 +37,8 @@ import numba.np.arraymath  # noqa: E402
 
 linalg.ensure_blas = _ensure_blas
 
+if numba.config.DISABLE_JIT:
+    raise ImportError("Coulomb's law is compiled by numba, which NUMBA_DISABLE_JIT switches off")
 _OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": {"reassoc", "contract"}}
 
 
