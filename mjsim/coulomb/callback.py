@@ -15,15 +15,83 @@ from typing import Any
 
 import numpy as np
 
-from .compiling import c_address
-from .engine import LIBRARY
-from .memory import Simulation
-from .step import TABLE, serve, table
+from .compiling import address_of, c_address, call, entry, kernel
+from .engine import LIBRARY, array_at, datas, models, words
+from .memory import Simulation, memories
+from .rigid import take_dampers_away
+from .step import conclude, law_of_a_step, store
 
 _SLOT = ctypes.c_void_p.in_dll(LIBRARY, "mjcb_control")
 
 _Switched = tuple[bool, Callable[[], None]]
 """Whether what brakes is made inertia; what puts a model's options back."""
+
+TABLE = np.dtype(
+    [
+        ("previous", np.int64),  # the callback that was there before, by its address
+        ("ask", np.int64),  # the function of Python that is told of simulations unknown here
+        ("models", np.int64),  # how many models are installed
+        ("model_at", np.int64),
+        ("simulations", np.int64),  # how many simulations are known, by the address of their mjData
+        ("data_at", np.int64),
+        ("memory_at", np.int64),
+    ],
+    align=True,
+)
+"""What the callback looks up. It is never changed, but for `previous`: another one takes its
+place."""
+
+table = np.zeros(1, np.int64)
+"""The address of the `TABLE` in force."""
+
+_table, _tables = address_of("coulomb_table", table), array_at(TABLE)
+
+
+@kernel
+def memory_of(m: int, d: int) -> int:
+    """Address of the memory of a simulation; 0 if it is not under the law."""
+    known = _tables(words(_table(), 1)[0], 1)[0]
+    datas, low, high = words(known.data_at, known.simulations), 0, known.simulations
+    while low < high:
+        middle = (low + high) // 2
+        if datas[middle] < d:
+            low = middle + 1
+        else:
+            high = middle
+    if low < known.simulations and datas[low] == d:
+        found = words(known.memory_at, known.simulations)[low]
+        if memories(found, 1)[0].model == m:
+            return int(found)
+    installed = words(known.model_at, known.models)
+    for i in range(known.models):
+        if installed[i] == m:
+            return int(call(known.ask, m, d))
+    return 0
+
+
+@entry
+def serve(m: int, d: int) -> None:
+    """The callback: apply the law to simulations under it, after what another callback does."""
+    previous = _tables(words(_table(), 1)[0], 1)[0].previous
+    if previous:
+        call(previous, m, d)
+    memory = memory_of(m, d)
+    if memory and memories(memory, 1)[0].active:
+        law_of_a_step(m, d, memory)
+
+
+@entry
+def finish(m: int, d: int, at: int, storing: bool) -> None:
+    """Find the forces of the last step, before anybody changes accelerations in mjData.
+
+    If they are for `storing`, put them where a state has them.
+    """
+    model, data, memory = models(m, 1)[0], datas(d, 1)[0], memories(at, 1)[0]
+    conclude(model, data, memory)
+    take_dampers_away(model, data, memory)
+    if storing and not memory.stored:  # what goes on from here does as what is restored
+        store(model, data, memory, True)
+        memory.stored, memory.ncon = 1, -1
 
 
 class Callback:

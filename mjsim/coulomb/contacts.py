@@ -1,9 +1,7 @@
-"""The contacts of a step: found, matched with those of the step before, mended.
+"""The contacts of a step: found, and matched with those of the step before.
 
 Each contact of the step before hands on its state, load and friction to the one that is now nearest
-to it on both bodies; friction turns with these, and what several hand on adds up. Colliders drop
-points of flat faces that still overlap, which are put back, and add some, which are left out like
-the seams of a floor.
+to it on both bodies; friction turns with these, and what several hand on adds up.
 """
 
 from __future__ import annotations
@@ -12,19 +10,7 @@ import math
 from typing import Any
 
 from .compiling import kernel
-from .engine import (
-    MJ_CONTACT,
-    engine_contacts,
-    integers,
-    mj_addContact,
-    mj_fwdVelocity,
-    mj_island,
-    mj_isSparse,
-    mj_makeConstraint,
-    mj_projectConstraint,
-    reals,
-    words,
-)
+from .engine import MJ_CONTACT, engine_contacts, integers, mj_isSparse, reals, words
 from .memory import (
     CONTACT_ROW,
     DRY,
@@ -42,20 +28,10 @@ from .memory import (
     pairs_at,
     rows_of,
 )
-from .parameters import (
-    ALIGNED,
-    ALIKE,
-    APART,
-    AT_MOST,
-    CORNER,
-    EDGE,
-    FARTHEST,
-    FLUSH,
-    STILL,
-    UNMOVED,
-)
+from .parameters import ALIKE, APART, FARTHEST, FLUSH, STILL, UNMOVED
 
 SIZE = MJ_CONTACT.itemsize
+
 WORDS = SIZE // 8
 
 
@@ -71,6 +47,22 @@ def smaller_radius(model: Any, contact: Any) -> float:
 def same_geoms(one: Any, other: Any) -> bool:
     """Whether two contacts are of the same geoms."""
     return bool(one[0] == other[0] and one[1] == other[1])
+
+
+@kernel
+def cosine(one: Any, other: Any) -> float:
+    """The cosine of the angle between the normals of two contacts."""
+    product = 0.0
+    for j in range(3):
+        product += one.frame[0, j] * other.frame[0, j]
+    return product
+
+
+@kernel
+def leave_out(data: Any, given: Any) -> None:
+    """Let a contact of mjData bear nothing: it allows any approach."""
+    given.exclude = 1
+    reals(data.efc_aref, data.nefc)[given.efc_address] = -APART
 
 
 # -- nothing has moved -----------------------------------------------------------------------------
@@ -448,228 +440,3 @@ def axis_of(t: int) -> int:
 def kind_of(t: int) -> int:
     """Whether a kind of friction is a force or a moment."""
     return FORCE if t < 2 else MOMENT
-
-
-# -- mended ----------------------------------------------------------------------------------------
-
-
-@kernel
-def put_points_back(model: Any, data: Any, memory: Any) -> bool:
-    """Put back corners of flat contacts that the collider has dropped while they overlap.
-
-    Returns whether there were any: the constraint rows are then made anew.
-    """
-    before, added = contacts_at(memory.before_at, memory.contacts_before), 0
-    radius = reals(model.geom_rbound, model.ngeom)
-    for i in range(len(before)):
-        old = before[i]
-        near = memory.law.near * max(radius[old.geoms[0]], radius[old.geoms[1]])
-        if not 1.99 * near**2 < old.moved < math.inf:
-            continue
-        place_lost_point(model, data, old)
-        if old.gap >= 0 or old.moved >= (near / 10) ** 2 or not is_lost(data, memory, old, near):
-            continue
-        complete_frame(old.frame)
-        if widest_angle(data, old) > CORNER:
-            add_point(data, memory, old)
-            added += 1
-    if added:
-        make_rows_anew(memory)
-    return added > 0
-
-
-@kernel
-def leave_added_points_out(model: Any, data: Any, memory: Any) -> bool:
-    """Leave out points that the collider adds to a patch whose points are all where they were.
-
-    They are deeper than the bodies can have come in a step: their springs would throw these apart.
-    Returns whether there were any.
-    """
-    contacts, found = contacts_of(memory), engine_contacts(data.contact, data.ncon)
-    before, left_out = contacts_at(memory.before_at, memory.contacts_before), False
-    velocity = reals(data.efc_vel, data.nefc)
-    for i in range(memory.contacts):
-        new = contacts[i]
-        closing = max(-velocity[new.address], 0.0) * model.opt.timestep
-        if new.state != NEW or -new.gap <= UNMOVED + AT_MOST * closing:
-            continue
-        had, kept = 0, True
-        for k in range(len(before)):
-            if same_geoms(before[k].geoms, new.geoms):
-                had, kept = had + 1, kept and before[k].moved < UNMOVED**2
-        if kept and had > 2:
-            leave_out(data, found[new.index])
-            left_out = True
-    return left_out
-
-
-@kernel
-def leave_inner_edges_out(model: Any, data: Any, memory: Any) -> bool:
-    """Leave out edges between pieces of a floor, at which what slides from one to the next would
-    stop: contacts about to close, with geoms below one that bears something.
-
-    Returns whether there were any.
-    """
-    contacts, found = contacts_of(memory), engine_contacts(data.contact, data.ncon)
-    velocity, h, left_out = reals(data.efc_vel, data.nefc), model.opt.timestep, False
-    for i in range(memory.contacts):
-        edge, inner = contacts[i], False
-        closing = max(-velocity[edge.address], 0.0) + h * memory.gravity
-        closes = edge.load == 0 and edge.gap < AT_MOST * h * closing
-        for k in range(memory.contacts if closes else 0):
-            if contacts[k].load > 0 and not inner:
-                inner = lies_below(model, data, edge, contacts[k])
-        if inner:
-            leave_out(data, found[edge.index])
-            left_out = True
-    return left_out
-
-
-@kernel
-def lies_below(model: Any, data: Any, edge: Any, floor: Any) -> bool:
-    """Whether what a moving geom touches lies, with its bounding box, below another contact of the
-    geom, which has another normal. Geoms are convex: all of this one lies above."""
-    if abs(cosine(edge, floor)) >= 1 - ALIGNED:
-        return False
-    bodies, below = integers(model.geom_bodyid, model.ngeom), False
-    boxes = reals(model.geom_aabb, (model.ngeom, 6))
-    xpos = reals(data.geom_xpos, (model.ngeom, 3))
-    xmat = reals(data.geom_xmat, (model.ngeom, 3, 3))
-    for side in range(2):
-        moving, piece, top = edge.geoms[side], edge.geoms[1 - side], 0.0
-        if bodies[moving] == 0 or (moving != floor.geoms[0] and moving != floor.geoms[1]):
-            continue
-        up = 1.0 if moving == floor.geoms[1] else -1.0
-        for j in range(3):
-            top += up * floor.frame[0, j] * (xpos[piece, j] - floor.pos[j])
-        for axis in range(3):
-            along = 0.0
-            for j in range(3):
-                along += up * floor.frame[0, j] * xmat[piece, j, axis]
-            top += along * boxes[piece, axis] + abs(along) * boxes[piece, 3 + axis]
-        if top > EDGE * smaller_radius(model, edge):
-            return False
-        below = True
-    return below
-
-
-@kernel
-def cosine(one: Any, other: Any) -> float:
-    """The cosine of the angle between the normals of two contacts."""
-    product = 0.0
-    for j in range(3):
-        product += one.frame[0, j] * other.frame[0, j]
-    return product
-
-
-@kernel
-def leave_out(data: Any, given: Any) -> None:
-    """Let a contact of mjData bear nothing: it allows any approach."""
-    given.exclude = 1
-    reals(data.efc_aref, data.nefc)[given.efc_address] = -APART
-
-
-@kernel
-def make_rows_anew(memory: Any) -> None:
-    """Let MuJoCo make the constraint rows of the contacts that there are now."""
-    mj_makeConstraint(memory.model, memory.data)
-    mj_island(memory.model, memory.data)
-    mj_projectConstraint(memory.model, memory.data)
-    mj_fwdVelocity(memory.model, memory.data)
-
-
-@kernel
-def place_lost_point(model: Any, data: Any, old: Any) -> None:
-    """Where a contact before would be now: its normal, its place, and the gap that has opened."""
-    xpos = reals(data.geom_xpos, (model.ngeom, 3))
-    xmat = reals(data.geom_xmat, (model.ngeom, 3, 3))
-    normal, along, opened = old.frame[0], old.frame[1], 0.0
-    for j in range(3):
-        normal[j], old.pos[j], along[j] = 0.0, 0.0, 0.0
-        for axis in range(3):
-            normal[j] += xmat[old.geoms[0], j, axis] * old.normal[axis]
-        for side in range(2):
-            place = xpos[old.geoms[side], j]
-            for axis in range(3):
-                place += xmat[old.geoms[side], j, axis] * old.place[side, axis]
-            old.pos[j] += place / 2
-            along[j] += place if side else -place
-        opened += normal[j] * along[j]
-    old.gap += opened
-    old.moved = 0.0  # along the surface, square, m2
-    for j in range(3):
-        old.moved += (along[j] - opened * normal[j]) ** 2
-
-
-@kernel
-def is_lost(data: Any, memory: Any, old: Any, near: float) -> bool:
-    """Whether the collider has no more points of this pair of geoms than before, and none near this
-    one: of the corners of a polygon, and of a heightfield, it takes some by turns."""
-    before = contacts_at(memory.before_at, memory.contacts_before)
-    found = engine_contacts(data.contact, data.ncon)
-    had, left = 0, 0
-    for i in range(len(before)):
-        had += same_geoms(before[i].geoms, old.geoms)
-    for i in range(data.ncon):
-        if same_geoms(found[i].geom, old.geoms):
-            left, old.index = left + 1, i
-            square = 0.0
-            for j in range(3):
-                square += (found[i].pos[j] - old.pos[j]) ** 2
-            if square <= near**2:
-                return False
-    return bool(0 < left <= had)
-
-
-@kernel
-def complete_frame(frame: Any) -> None:
-    """Give a normal two tangents."""
-    normal, across, along, thin = frame[0], frame[1], frame[2], 0
-    for j in range(1, 3):  # the axis that is farthest from the normal
-        thin = j if abs(normal[j]) < abs(normal[thin]) else thin
-    for j in range(3):
-        one, two = (j + 1) % 3, (j + 2) % 3
-        across[j] = normal[one] * (two == thin) - normal[two] * (one == thin)
-    length = math.sqrt(across[0] ** 2 + across[1] ** 2 + across[2] ** 2)
-    for j in range(3):
-        across[j] /= length
-    for j in range(3):
-        one, two = (j + 1) % 3, (j + 2) % 3
-        along[j] = normal[one] * across[two] - normal[two] * across[one]
-
-
-@kernel
-def widest_angle(data: Any, old: Any) -> float:
-    """The widest angle without other points of the patch that a lost point sees, rad."""
-    found, widest = engine_contacts(data.contact, data.ncon), 0.0
-    for i in range(data.ncon):
-        if same_geoms(found[i].geom, old.geoms):
-            angle, gap = angle_to(found[i].pos, old), 2 * math.pi
-            for k in range(data.ncon):
-                if k != i and same_geoms(found[k].geom, old.geoms):
-                    gap = min(gap, (angle_to(found[k].pos, old) - angle) % (2 * math.pi))
-            widest = max(widest, gap)
-    return widest
-
-
-@kernel
-def angle_to(pos: Any, old: Any) -> float:
-    """Direction in which a place is seen from a lost point, in its tangents, rad."""
-    x, y = 0.0, 0.0
-    for j in range(3):
-        x += old.frame[1, j] * (pos[j] - old.pos[j])
-        y += old.frame[2, j] * (pos[j] - old.pos[j])
-    return math.atan2(y, x)
-
-
-@kernel
-def add_point(data: Any, memory: Any, old: Any) -> None:
-    """Add a lost point to mjData, else as the last of its pair of geoms there is."""
-    copy(data.contact + SIZE * old.index, memory.point_at, WORDS)
-    point = engine_contacts(memory.point_at, 1)[0]
-    point.dist = old.gap
-    for j in range(3):
-        point.pos[j] = old.pos[j]
-        for axis in range(3):
-            point.frame[3 * axis + j] = old.frame[axis, j]
-    mj_addContact(memory.model, memory.data, memory.point_at)

@@ -14,10 +14,9 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from .callback import CALLBACK
+from .callback import CALLBACK, finish
 from .memory import Simulation, check_state, sizes
 from .parameters import CCD_TOLERANCE, EARTH, Law
-from .step import finish
 
 _RK4, _EULER = int(mujoco.mjtIntegrator.mjINT_RK4), int(mujoco.mjtIntegrator.mjINT_EULER)
 _INTEGRATORS = {

@@ -9,9 +9,6 @@ M a = q + J' f(a) for the accelerations a (Alart and Curnier 1991; Acary, Brémo
 Advanced Topics in Nonsmooth Dynamics, 3). Its derivative isn't symmetric, since friction grows with
 the normal force. What contacts bear is then held, and solved for again, until R matters no more
 (proximal point, augmented Lagrangian); a large R makes each iteration tame.
-
-Rows that act together are a unit, known by the first of them: a contact, or a single row. An island
-is known by its first degree of freedom, from which lists go through its others and its units.
 """
 
 from __future__ import annotations
@@ -24,8 +21,8 @@ import numpy as np
 from .compiling import kernel
 from .engine import integers, reals
 from .friction import shift
+from .islands import find_envelope, find_islands, find_units
 from .memory import (
-    CONTACT_ROW,
     DRY,
     ONE_SIDED,
     OPEN,
@@ -103,128 +100,7 @@ def row_stiffness(row: Any) -> float:
     return 0.0 if slides or row.force == 0 else 1 / row.R
 
 
-# -- units and islands -----------------------------------------------------------------------------
-
-
-@kernel
-def find_units(memory: Any) -> None:
-    """Make contacts and other rows units."""
-    rows, contacts = rows_of(memory), contacts_of(memory)
-    for r in range(len(rows)):
-        row = rows[r]
-        row.dim, row.contact, row.force = row.kind < CONTACT_ROW, -1, 0.0
-    for k in range(memory.contacts):
-        unit = rows[contacts[k].address]
-        unit.dim, unit.contact = contacts[k].dim, k
-
-
-@kernel
-def find_islands(model: Any, memory: Any, everywhere: bool) -> None:
-    """Find the islands of degrees of freedom that units or joints connect.
-
-    Open contacts connect none, but belong to the island in which they are, if it is one. Those
-    islands are due in which a contact has just closed; or all, `everywhere`.
-    """
-    rows, contacts, dofs = rows_of(memory), contacts_of(memory), dofs_of(memory)
-    parent = integers(model.dof_parentid, model.nv)
-    for i in range(model.nv):
-        dofs[i].label = root(dofs, parent[i]) if parent[i] >= 0 else i
-        dofs[i].tree = dofs[parent[i]].tree if parent[i] >= 0 else i
-        dofs[i].next, dofs[i].unit, dofs[i].due = -1, -1, everywhere
-    for u in range(len(rows)):
-        rows[u].dof = -1
-        column = columns_of(memory, rows[u])
-        if rows[u].dim > 0 and len(column) > 0:
-            rows[u].dof = column[0]
-            connects = rows[u].contact < 0 or contacts[rows[u].contact].state != OPEN
-            for n in range(len(column) if connects else 0):
-                one, other = root(dofs, column[0]), root(dofs, column[n])
-                dofs[max(one, other)].label = min(one, other)
-    for i in range(model.nv - 1, -1, -1):
-        first = root(dofs, i)
-        dofs[i].label = first
-        if first != i:
-            dofs[i].next, dofs[first].next = dofs[first].next, i
-    for u in range(len(rows) - 1, -1, -1):
-        if rows[u].dof >= 0 and in_one_island(dofs, columns_of(memory, rows[u])):
-            island = dofs[dofs[rows[u].dof].label]
-            rows[u].next, island.unit = island.unit, u
-            if rows[u].contact >= 0:
-                island.due |= contacts[rows[u].contact].closes
-
-
-@kernel
-def in_one_island(dofs: Any, column: Any) -> bool:
-    """Whether degrees of freedom belong to the same island."""
-    same = True
-    for c in column:
-        same = same and dofs[c].label == dofs[column[0]].label
-    return same
-
-
-@kernel
-def root(dofs: Any, i: int) -> int:
-    """The first of an island, followed along labels."""
-    while dofs[i].label != i:
-        dofs[i].label = dofs[dofs[i].label].label
-        i = dofs[i].label
-    return i
-
-
 # -- one island ------------------------------------------------------------------------------------
-
-
-@kernel
-def find_envelope(model: Any, memory: Any, first: int) -> int:
-    """Number an island's degrees of freedom, tree by tree, so that rows of its derivative are short
-    (Cuthill and McKee 1969); where they begin, and how far they reach; its size."""
-    starts, columns = integers(model.M_rowadr, model.nv), integers(model.M_colind, model.nC)
-    rows, dofs, size = rows_of(memory), dofs_of(memory), 0
-    last = find_levels(memory, first, find_levels(memory, first, first))
-    for level in range(dofs[last].level, -1, -1):
-        i = first
-        while i >= 0:
-            if dofs[dofs[i].tree].level == level:
-                dofs[i].place = size
-                dofs[size].envelope, dofs[size].reach = dofs[columns[starts[i]]].place, size
-                size += 1
-            i = dofs[i].next
-    u = dofs[first].unit
-    while u >= 0:
-        column, place, least = columns_of(memory, rows[u]), places_of(memory, rows[u]), size
-        for n in range(len(place)):
-            place[n] = dofs[column[n]].place
-            least = min(least, place[n])
-        for k in place:
-            dofs[k].envelope = min(dofs[k].envelope, least)
-        u = rows[u].next
-    for k in range(size):
-        begin = dofs[dofs[k].envelope]
-        begin.reach = max(begin.reach, k)
-    for k in range(1, size):
-        dofs[k].reach = max(dofs[k].reach, dofs[k - 1].reach)
-    return size
-
-
-@kernel
-def find_levels(memory: Any, first: int, start: int) -> int:
-    """Find how many units each tree of an island is away from the one that starts there; return one
-    of the farthest."""
-    rows, dofs, i, last, level = rows_of(memory), dofs_of(memory), first, start, 0
-    while i >= 0:
-        dofs[i].level, i = -1, dofs[i].next
-    dofs[start].level = 0
-    while dofs[last].level == level:
-        u, level = dofs[first].unit, level + 1
-        while u >= 0:
-            column, near = columns_of(memory, rows[u]), False
-            for c in column:
-                near = near or dofs[dofs[c].tree].level == level - 1
-            for c in column:
-                if near and dofs[dofs[c].tree].level < 0:
-                    dofs[dofs[c].tree].level, last = level, dofs[c].tree
-            u = rows[u].next
-    return last
 
 
 @kernel

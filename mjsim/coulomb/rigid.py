@@ -1,4 +1,4 @@
-"""Rigid contacts: Moreau and Jean's time stepping in MuJoCo's rows, and bodies that turn freely.
+"""Rigid contacts: Moreau and Jean's time stepping in MuJoCo's rows.
 
 A closed contact asks for the velocity at the end of the step: none, or Newton's share of that
 before an impact (Moreau 1988; Jean 1999, Comput. Methods Appl. Mech. Eng. 177). One that is open
@@ -10,18 +10,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import mujoco
-
 from .compiling import kernel
 from .contacts import cosine, smaller_radius
 from .engine import integers, mj_factorM, mj_fwdActuation, mjd_smooth_vel, reals
 from .friction import shift
-from .memory import SLIDES, bodies_at, contacts_of, rows_of
-from .parameters import ALIGNED, APART, BOUNCES, ITERATIONS, NARROW, STUCK, USUAL_STEP
+from .memory import SLIDES, contacts_of, rows_of
+from .parameters import ALIGNED, APART, BOUNCES, NARROW, STUCK, USUAL_STEP
 from .rows import times
-
-FREE, SLIDE = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_SLIDE)
-
 
 # -- contacts --------------------------------------------------------------------------------------
 
@@ -273,158 +268,3 @@ def take_dampers_away(model: Any, data: Any, memory: Any) -> None:
     for k in range(model.nC if ours else 0):
         inertia[k] = free[k]
     memory.braked = -1
-
-
-# -- vectors ---------------------------------------------------------------------------------------
-
-
-@kernel
-def cross(a: Any, b: Any) -> Any:
-    """The cross product of two vectors."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@kernel
-def dot(a: Any, b: Any) -> float:
-    """The scalar product of two vectors."""
-    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
-
-
-@kernel
-def times_vector(x: float, a: Any) -> Any:
-    """The vector x a."""
-    return x * a[0], x * a[1], x * a[2]
-
-
-@kernel
-def plus(a: Any, x: float, b: Any) -> Any:
-    """The vector a + x b."""
-    return a[0] + x * b[0], a[1] + x * b[1], a[2] + x * b[2]
-
-
-@kernel
-def applied(matrix: Any, a: Any) -> Any:
-    """A matrix, as a tuple of its rows, times a vector."""
-    return dot(matrix[0], a), dot(matrix[1], a), dot(matrix[2], a)
-
-
-@kernel
-def vector_at(values: Any, first: int) -> Any:
-    """Three numbers of an array as a vector."""
-    return values[first], values[first + 1], values[first + 2]
-
-
-@kernel
-def rotated(a: Any, turn: Any) -> Any:
-    """A vector turned about an axis, by an angle as long as the axis, rad (Rodrigues)."""
-    square, across = dot(turn, turn) + 1e-300, cross(turn, a)
-    angle = math.sqrt(square)
-    return plus(
-        plus(a, math.sin(angle) / angle, across),
-        (1 - math.cos(angle)) / square,
-        cross(turn, across),
-    )
-
-
-# -- bodies that turn freely -----------------------------------------------------------------------
-
-
-@kernel
-def turn_accelerations(model: Any, data: Any, memory: Any, elapsed: float) -> None:
-    """Turn the angular accelerations of the last step, of so many seconds, along with the bodies,
-    in whose axes they are."""
-    types, dofs = integers(model.jnt_type, model.njnt), integers(model.jnt_dofadr, model.njnt)
-    velocity = reals(data.qvel, model.nv)
-    for i in range(model.njnt if memory.law.rigid else 0):
-        if types[i] >= SLIDE:
-            continue
-        first = dofs[i] + 3 if types[i] == FREE else dofs[i]
-        back = times_vector(-elapsed, vector_at(velocity, first))
-        for of in (reals(data.qacc, model.nv), reals(data.qacc_warmstart, model.nv)):
-            turned = rotated(vector_at(of, first), back)
-            for j in range(3):
-                of[first + j] = turned[j]
-
-
-@kernel
-def add_gyroscopic_moments(model: Any, data: Any, memory: Any, known: bool, over: bool) -> None:
-    """Gyroscopic moments of free bodies by the implicit midpoint rule, with those of the last step.
-
-    A body that turns freely keeps its energy and the size of its angular momentum; and its centre
-    of mass keeps its velocity where it is not the body's origin.
-    """
-    bodies = bodies_at(memory.body_at, memory.free_bodies)
-    for i in range(len(bodies)):
-        add_moment_of(model, data, bodies[i], known, over)
-
-
-@kernel
-def add_moment_of(model: Any, data: Any, free: Any, known: bool, over: bool) -> None:
-    """The gyroscopic moment of a free body, in its own axes, and the force on its origin."""
-    bias, h = reals(data.qfrc_bias, model.nv), model.opt.timestep
-    mass, inertia, axes, spin, arm = motion_of(model, data, free.body)
-    momentum, pushed = applied(inertia, spin), (0.0, 0.0, 0.0)
-    if known and over:
-        gained = plus(momentum, -1.0, applied(axes, vector_at(free.coasting, 0)))
-        pushed = rotated(gained, times_vector(-h, spin))
-    elif known:
-        pushed = vector_at(free.pushed, 0)
-    change, after = turned_freely(inertia, momentum, spin, pushed, h)
-    force, moment = of_the_origin(mass, arm, spin, after, h)
-    moment = plus(plus(moment, -1 / h, change), -1.0, cross(spin, momentum))
-    coasting = plus(momentum, 1.0, change)
-    for j in range(3):
-        column = axes[0][j], axes[1][j], axes[2][j]
-        bias[free.dof + j] += force[j]
-        for k in range(3):
-            bias[free.dof + 3 + j] += column[k] * moment[k]
-        free.pushed[j], free.coasting[j] = pushed[j], dot(column, coasting)
-
-
-@kernel
-def motion_of(model: Any, data: Any, b: int) -> Any:
-    """Mass of a free body, its inertia about the centre of mass, its axes, spin, and the way from
-    its origin to the centre of mass."""
-    n = model.nbody
-    of, axes, spins = reals(data.crb, (n, 10))[b], reals(data.xmat, 9 * n), reals(data.cvel, 6 * n)
-    centres, origins = reals(data.subtree_com, 3 * n), reals(data.xpos, 3 * n)
-    return (
-        of[9],
-        ((of[0], of[3], of[4]), (of[3], of[1], of[5]), (of[4], of[5], of[2])),
-        (vector_at(axes, 9 * b), vector_at(axes, 9 * b + 3), vector_at(axes, 9 * b + 6)),
-        vector_at(spins, 6 * b),
-        plus(vector_at(centres, 3 * b), -1.0, vector_at(origins, 3 * b)),
-    )
-
-
-@kernel
-def turned_freely(inertia: Any, momentum: Any, spin: Any, pushed: Any, h: float) -> Any:
-    """Change of angular momentum in a step, without what pushes, in axes of the body, N m s.
-
-    Implicit midpoint: with the turn of half a step, t = h/2 middle, the momentum L + p/2 + c
-    there obeys c = (p/2 + L_half x t - t² L + (t L_half) t) / (1 + t²). Also the spin after it.
-    """
-    x, y, z = inertia
-    volume, inverse = dot(x, cross(y, z)), (cross(y, z), cross(z, x), cross(x, y))
-    half, middle, change = plus(momentum, 0.5, pushed), spin, pushed
-    for _ in range(ITERATIONS):
-        turn = times_vector(h / 2, middle)
-        square = dot(turn, turn)
-        change = plus(plus(cross(half, turn), 0.5, pushed), -square, momentum)
-        change = times_vector(1 / (1 + square), plus(change, dot(turn, half), turn))
-        last, middle = middle, plus(spin, 1 / volume, applied(inverse, change))
-        moved = plus(middle, -1.0, last)
-        if dot(moved, moved) <= 1e-32 * dot(middle, middle):  # soon of a body that is round
-            break
-    change = plus(change, 1.0, plus(change, -1.0, pushed))
-    return change, plus(middle, 1.0, plus(middle, -1.0, spin))
-
-
-@kernel
-def of_the_origin(mass: float, arm: Any, spin: Any, after: Any, h: float) -> Any:
-    """Force and moment that keep the velocity of a centre of mass which is off the origin, N, N
-    m."""
-    across = cross(after, arm)
-    swung = plus(rotated(across, times_vector(h, after)), -1.0, across)
-    force = plus(times_vector(mass / h, swung), -mass, cross(spin, cross(spin, arm)))
-    return force, cross(arm, force)

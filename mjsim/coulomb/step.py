@@ -1,35 +1,20 @@
-"""The law of a step, between MuJoCo's velocities and its solver; and the callback that applies
-it."""
+"""The law of a step, between MuJoCo's velocities and its solver."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
 
-import numpy as np
-
-from .compiling import address_of, call, entry, kernel
-from .contacts import (
-    copy_jacobians,
-    find,
-    leave_added_points_out,
-    leave_inner_edges_out,
-    match,
-    nothing_moved,
-    put_points_back,
-    read_gaps,
-    remember_forces,
-)
+from .compiling import kernel
+from .contacts import copy_jacobians, find, match, nothing_moved, read_gaps, remember_forces
 from .engine import (
     WARNINGS,
-    array_at,
     datas,
     mj_fwdAcceleration,
     mj_fwdActuation,
     mj_fwdConstraint,
     models,
     reals,
-    words,
 )
 from .friction import (
     extrapolate_slip,
@@ -43,16 +28,15 @@ from .friction import (
 from .memory import CONTACT_ROW, DRY, contacts_of, memories, rows_of
 from .newton import solve_contacts
 from .parameters import EARTH, NEXT, OVER, SOFTER
+from .patches import leave_added_points_out, leave_inner_edges_out, put_points_back
 from .rigid import (
     add_dampers,
-    add_gyroscopic_moments,
     oppose_slip_at_mid_step,
     share_loads,
     share_regularisation,
     stiffen,
     take_dampers_away,
     take_depth_away,
-    turn_accelerations,
 )
 from .rows import (
     add_turning,
@@ -63,6 +47,7 @@ from .rows import (
     store_velocities,
     write_references,
 )
+from .turning import add_gyroscopic_moments, turn_accelerations
 
 
 @kernel
@@ -300,72 +285,3 @@ def soften(memory: Any) -> None:
     for i in range(memory.contacts):
         for r in range(contacts[i].address, contacts[i].address + contacts[i].dim):
             rows[r].R *= SOFTER
-
-
-# -- MuJoCo's control callback ---------------------------------------------------------------------
-
-TABLE = np.dtype(
-    [
-        ("previous", np.int64),  # the callback that was there before, by its address
-        ("ask", np.int64),  # the function of Python that is told of simulations unknown here
-        ("models", np.int64),  # how many models are installed
-        ("model_at", np.int64),
-        ("simulations", np.int64),  # how many simulations are known, by the address of their mjData
-        ("data_at", np.int64),
-        ("memory_at", np.int64),
-    ],
-    align=True,
-)
-"""What the callback looks up. It is never changed, but for `previous`: another one takes its
-place."""
-
-table = np.zeros(1, np.int64)
-"""The address of the `TABLE` in force."""
-_table, _tables = address_of("coulomb_table", table), array_at(TABLE)
-
-
-@kernel
-def memory_of(m: int, d: int) -> int:
-    """Address of the memory of a simulation; 0 if it is not under the law."""
-    known = _tables(words(_table(), 1)[0], 1)[0]
-    datas, low, high = words(known.data_at, known.simulations), 0, known.simulations
-    while low < high:
-        middle = (low + high) // 2
-        if datas[middle] < d:
-            low = middle + 1
-        else:
-            high = middle
-    if low < known.simulations and datas[low] == d:
-        found = words(known.memory_at, known.simulations)[low]
-        if memories(found, 1)[0].model == m:
-            return int(found)
-    installed = words(known.model_at, known.models)
-    for i in range(known.models):
-        if installed[i] == m:
-            return int(call(known.ask, m, d))
-    return 0
-
-
-@entry
-def serve(m: int, d: int) -> None:
-    """The callback: apply the law to simulations under it, after what another callback does."""
-    previous = _tables(words(_table(), 1)[0], 1)[0].previous
-    if previous:
-        call(previous, m, d)
-    memory = memory_of(m, d)
-    if memory and memories(memory, 1)[0].active:
-        law_of_a_step(m, d, memory)
-
-
-@entry
-def finish(m: int, d: int, at: int, storing: bool) -> None:
-    """Find the forces of the last step, before anybody changes accelerations in mjData.
-
-    If they are for `storing`, put them where a state has them.
-    """
-    model, data, memory = models(m, 1)[0], datas(d, 1)[0], memories(at, 1)[0]
-    conclude(model, data, memory)
-    take_dampers_away(model, data, memory)
-    if storing and not memory.stored:  # what goes on from here does as what is restored
-        store(model, data, memory, True)
-        memory.stored, memory.ncon = 1, -1
