@@ -152,7 +152,7 @@ def _hdf5(path: Path) -> Trajectory | dict[str, Array]:
         if not path.is_file():
             raise
         ours = error
-    with reading(path, sealed=False) as file:
+    with reading(path, ours=False) as file:
         if "schema" not in file.attrs:
             names = [name for name in ("t", *UNITS) if file.get(name, getlink=True)]
             found = {name: dataset(file, name) for name in names}

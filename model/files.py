@@ -53,14 +53,23 @@ def check_writable(path: str | Path) -> None:
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file, whole or not at all; raises `StorageError`."""
+    """Write a file, whole or not at all; raises `StorageError`, also for what is no file: as the
+    superuser a new file would replace /dev/null."""
     try:
-        made = temporary(path)
+        if path.exists() and not path.is_file():
+            raise StorageError(f"cannot write {path}: it is not a file")
+        end = path.name[-50:]  # what tells files of one program apart; a name has at most 255 bytes
+        made = path.with_name(f".{end}.{_HOST}.{os.getpid()}{_SUFFIX}").absolute()
+        _under_way.add(made)
         try:
-            made.write_bytes(content)
+            with made.open("wb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
             made.replace(path)
         finally:
-            remove(made)
+            made.unlink(missing_ok=True)
+            _under_way.discard(made)
     except OSError as error:
         raise StorageError(f"cannot write {path}: {error.strerror}") from error
 
@@ -96,26 +105,6 @@ def remove_leftovers(directory: Path) -> None:
                 path.unlink(missing_ok=True)
             except PermissionError:
                 continue  # it lives, and is somebody else's
-
-
-def temporary(path: Path) -> Path:
-    """A name beside a file's, with the machine and process that write it, to be given to `remove`
-    in the end.
-
-    Raises `StorageError` for what is no file: the new file takes the place of the old one, and as
-    the superuser that would replace /dev/null."""
-    if path.exists() and not path.is_file():
-        raise StorageError(f"cannot write {path}: it is not a file")
-    end = path.name[-50:]  # what tells files of one program apart; a name has at most 255 bytes
-    made = path.with_name(f".{end}.{_HOST}.{os.getpid()}{_SUFFIX}").absolute()
-    _under_way.add(made)
-    return made
-
-
-def remove(made: Path) -> None:
-    """Remove a temporary file, if it is still there under its temporary name."""
-    made.unlink(missing_ok=True)
-    _under_way.discard(made)
 
 
 def leave(code: int) -> NoReturn:

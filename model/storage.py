@@ -1,19 +1,15 @@
 """The HDF5 form of trajectories, flat, whole or not there at all: one run a file, or the runs of a
 batch in one.
 
-`TrajectoryWriter` appends blocks of samples while a simulation runs, to a temporary name that
-becomes the final one only when the file is whole. `save_batch` writes many short runs at once,
-along a dimension ``run`` where each has a name: ``FILE/NAME`` is read as if it were a file of its
-own. Readers trust nothing: links that lead out of the file are refused, and so is a file that is
-damaged, foreign, or written by a newer version."""
+`save_batch` writes many short runs along a dimension ``run`` where each has a name: ``FILE/NAME``
+is read as if it were a file of its own. Readers trust nothing: links that lead out of the file are
+refused, and so is a file that is damaged, foreign, or written by a newer version."""
 
 from __future__ import annotations
 
 import dataclasses
 import json
-import sys
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,16 +20,12 @@ import numpy.typing as npt
 from model.cases import Case
 from model.errors import StorageError
 from model.flow import Flow
-from model.hdf5 import WholeFile, dataset, reading
+from model.hdf5 import dataset, reading, writing
 from model.parameters import Parameters
 from model.trajectory import (
     AXES,
-    AXIS_ATTRIBUTES,
     CONVENTIONS,
     FLUID,
-    SAMPLE,
-    SCHEMA,
-    SCHEMA_VERSION,
     Events,
     Header,
     Trajectory,
@@ -42,69 +34,34 @@ from model.trajectory import (
 )
 from model.versions import current_versions
 
+SCHEMA, SCHEMA_VERSION = "dualball-trajectory", 1
 BATCH, BATCH_VERSION = "dualball-batch", 1
-"""What a file of many runs says of itself."""
+"""What a file of one run, and one of many, say of themselves."""
+AXIS_ATTRIBUTES = {
+    "units": "1",
+    "long_name": "axes of the co-rotating frame: x inwards, y up, z along",
+}
 _CASE_ENUM = h5py.enum_dtype({case.name: case.value for case in Case}, basetype=np.int8)
 _TEXT = h5py.string_dtype()
 _PACKED = {"compression": "gzip", "shuffle": True}
 
 
-def save(trajectory: Trajectory, path: str | Path) -> None:
-    """Write a whole trajectory; raises `StorageError` if that can't be done, leaving nothing
-    behind."""
-    samples = np.empty(len(trajectory.time), SAMPLE)
-    for name in columns(Trajectory):
-        samples[name] = getattr(trajectory, name)
-    with TrajectoryWriter(path, trajectory.header) as writer:
-        writer.append(samples)
-        writer.end(trajectory.events, trajectory.header.failure)
+def save(run: Trajectory, path: str | Path) -> None:
+    """Write a run; raises `StorageError` if that can't be done, leaving nothing behind."""
+    with writing(path) as file:
+        write(run, file)
 
 
-class TrajectoryWriter(WholeFile):
-    """Writes a trajectory block by block; a context manager, at whose end `end` is to be called,
-    see `WholeFile`."""
-
-    def __init__(self, path: str | Path, header: Header) -> None:
-        super().__init__(path)
-        self._flow = header.flow
-        with ExitStack() as begun:
-            begun.push(self)  # removes the file if this fails
-            scales = _write_common(self.file, SCHEMA, SCHEMA_VERSION)
-            self.file.attrs.update(header.attributes())
-            self.file.create_dataset("mjcf", data=header.mjcf, dtype=_TEXT)
-            for of, time in ((Trajectory, "time"), (Events, "event_time")):
-                for meta in [*columns(of).values(), *([FLUID] if of is Trajectory else [])]:
-                    shape = meta["shape"]
-                    sizes = {
-                        "shape": (0, *shape),
-                        "maxshape": (None, *shape),
-                        "chunks": (1024, *shape),
-                    }
-                    _create_column(self.file, meta, (time, "axis"), scales, **sizes, **_PACKED)
-            begun.pop_all()
-
-    def append(self, samples: npt.NDArray[np.void]) -> None:
-        """Add a block of samples, a structured array of dtype `model.trajectory.SAMPLE`, and flush
-        it."""
-        added = {name: samples[name] for name in columns(Trajectory)} | {
-            "omega_0": self._flow(samples["time"])
-        }
-        for name, values in added.items():
-            column = self.file[name]
-            n = column.shape[0]
-            column.resize(n + len(samples), axis=0)
-            column[n:] = values
-        self.flush()
-
-    def end(self, events: Events, failure: str = "", path: str | Path | None = None) -> None:
-        """Write the events and why the run stopped early, if it did; then give the file its name,
-        or `path`."""
-        for name, meta in columns(Events).items() if len(events) else ():
-            column = self.file[meta["name"]]
-            column.resize(len(events), axis=0)
-            column[...] = getattr(events, name)
-        self.file.attrs["failure"] = failure
-        self.finish(path)
+def write(run: Trajectory, file: h5py.File) -> None:
+    """Write a run into a file of its own."""
+    scales = _write_common(file, SCHEMA, SCHEMA_VERSION)
+    file.attrs.update(run.header.attributes())
+    file.create_dataset("mjcf", data=run.header.mjcf, dtype=_TEXT)
+    for table, time in ((run, "time"), (run.events, "event_time")):
+        for name, meta in _stored_columns(type(table)).items():
+            values, shape = getattr(table, name), meta["shape"]
+            layout = {"maxshape": (None, *shape), "chunks": (1024, *shape), **_PACKED}
+            _create_column(file, meta, (time, "axis"), scales, data=values, **layout)
 
 
 def save_batch(runs: Mapping[str, Trajectory], path: str | Path) -> None:
@@ -114,8 +71,7 @@ def save_batch(runs: Mapping[str, Trajectory], path: str | Path) -> None:
     Columns have shape (run, sample, ...) and (run, event, ...); behind the samples and events that
     a run has they are filled with nan, and cases with -1. What a file of one run says in attributes
     is JSON in `header` (run)."""
-    with WholeFile(path) as whole:
-        file = whole.file
+    with writing(path) as file:
         scales = _write_common(file, BATCH, BATCH_VERSION)
         file.attrs.update(
             Conventions=CONVENTIONS, title=f"Motions of dual-point contact balls: {len(runs)} runs"
@@ -133,8 +89,7 @@ def save_batch(runs: Mapping[str, Trajectory], path: str | Path) -> None:
             file.create_dataset(f"{dimension}s", data=counts).dims[0].attach_scale(scales["run"])
             scales[dimension] = file.create_dataset(dimension, data=np.arange(max(counts)))
             scales[dimension].make_scale(dimension)
-            more = {"omega_0": FLUID} if of is Trajectory else {}
-            for name, meta in (columns(of) | more).items():
+            for name, meta in _stored_columns(of).items():
                 empty = -1 if meta["dtype"] is np.int8 else np.nan
                 values = np.full((len(runs), max(counts), *meta["shape"]), empty, meta["dtype"])
                 for row, count, table in zip(values, counts, tables, strict=True):
@@ -142,7 +97,6 @@ def save_batch(runs: Mapping[str, Trajectory], path: str | Path) -> None:
                 sizes = {"compression_opts": 1, **_PACKED} if values.size else {}
                 names = ("run", dimension, "axis")
                 _create_column(file, meta, names, scales, data=values, **sizes)
-        whole.finish()
 
 
 def load(path: str | Path) -> Trajectory:
@@ -150,28 +104,16 @@ def load(path: str | Path) -> Trajectory:
 
     Raises `StorageError`, in one line, for a file that isn't one or is damaged.
     """
-    (whole,) = parts(path, sys.maxsize)
-    return whole
-
-
-def parts(path: str | Path, size: int) -> Iterator[Trajectory]:
-    """Read a trajectory `size` samples at a time, so that it may be larger than memory; at least
-    one part.
-
-    Each part has the header and all events; a run from a batch comes as one part. Raises
-    `StorageError` as `load` does."""
     path = Path(path)
-    if path.parent.is_file():
-        try:
-            yield load_runs(path.parent)[path.name]
-        except KeyError as error:
-            raise StorageError(
-                f"cannot read {path}: {path.parent} holds no run of that name"
-            ) from error
-        return
-    with reading(path) as file:
-        for start in range(0, max(len(dataset(file, "time")), 1), size):
-            yield _read(file, slice(start, start + size))
+    if not path.parent.is_file():
+        with reading(path) as file:
+            return _read(file)
+    try:
+        return load_runs(path.parent)[path.name]
+    except KeyError as error:
+        raise StorageError(
+            f"cannot read {path}: {path.parent} holds no run of that name"
+        ) from error
 
 
 def contents(path: str | Path) -> tuple[str, list[str]]:
@@ -195,7 +137,7 @@ def load_runs(path: str | Path) -> dict[str, Trajectory]:
     `load` does."""
     with reading(path) as file:
         if file.attrs.get("schema") != BATCH:
-            return {"": _read(file, slice(None))}
+            return {"": _read(file)}
         _check_schema(file, BATCH, BATCH_VERSION)
         names, headers = (dataset(file, name).asstr()[...].tolist() for name in ("run", "header"))
         counts = (dataset(file, name)[...].tolist() for name in ("samples", "events"))
@@ -220,6 +162,11 @@ def _write_common(file: h5py.File, schema: str, version: int) -> dict[str, h5py.
     return {"axis": axis}
 
 
+def _stored_columns(of: type[Trajectory] | type[Events]) -> dict[str, Mapping[str, Any]]:
+    """The columns of a table, with the flow, which isn't read back."""
+    return columns(of) | ({"omega_0": FLUID} if of is Trajectory else {})
+
+
 def _create_column(
     file: h5py.File,
     meta: Mapping[str, Any],
@@ -241,13 +188,13 @@ def _create_column(
             column.make_scale(scale)
 
 
-def _read(file: h5py.File, part: slice) -> Trajectory:
-    """Read a part of the samples of a file of one run, with all events."""
+def _read(file: h5py.File) -> Trajectory:
+    """Read a file of one run."""
     if file.attrs.get("schema") == BATCH:
         raise StorageError("it holds the runs of a batch: name one of them, as FILE/NAME")
     _check_schema(file, SCHEMA, SCHEMA_VERSION)
     texts = dict(file.attrs) | {"mjcf": dataset(file, "mjcf").asstr()[()]}
-    return _trajectory(texts, _table(file, Trajectory, 1, part), _table(file, Events, 1))
+    return _trajectory(texts, _table(file, Trajectory, 1), _table(file, Events, 1))
 
 
 def _check_schema(file: h5py.File, name: str, newest: int) -> None:
@@ -301,7 +248,7 @@ def _attribute(texts: Mapping[str, Any], name: str, kind: type) -> Any:
 
 
 def _table(
-    file: h5py.File, of: type[Trajectory] | type[Events], leading: int, part: slice = slice(None)
+    file: h5py.File, of: type[Trajectory] | type[Events], leading: int
 ) -> dict[str, npt.NDArray[Any]]:
     """Read and check all columns of a table whose arrays have `leading` dimensions before those of
     one entry."""
@@ -315,7 +262,7 @@ def _table(
             raise StorageError(f"{name!r} has shape {stored.shape}")
         if stored.dtype.kind != np.dtype(meta["dtype"]).kind:
             raise StorageError(f"{name!r} has type {stored.dtype}")
-        values[column] = np.asarray(stored[part], dtype=meta["dtype"])
+        values[column] = np.asarray(stored[...], dtype=meta["dtype"])
     lengths = {name: column.shape[:leading] for name, column in values.items()}
     if len(set(lengths.values())) > 1:
         raise StorageError(f"its columns differ in length ({lengths})")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -26,12 +27,6 @@ if TYPE_CHECKING:
 
 AXES = ("x", "y", "z")
 """The paper's axes: x radially inwards, y upwards, z along the orbit."""
-AXIS_ATTRIBUTES = {
-    "units": "1",
-    "long_name": "axes of the co-rotating frame: x inwards, y up, z along",
-}
-SCHEMA, SCHEMA_VERSION = "dualball-trajectory", 1
-"""What a file or an xarray data set of a trajectory says of itself."""
 CONVENTIONS = "CF-1.11"
 """Those of climate and forecast metadata, which readers such as xarray know."""
 
@@ -172,23 +167,19 @@ class Trajectory:
         """The trajectory as xarray opens its file: units, names of the cases, events, where it
         comes from.
 
-        Raises `InputError` if xarray, an optional dependency, isn't installed.
-        """
+        Raises `InputError` if xarray or h5netcdf, optional dependencies, aren't installed."""
         try:
-            import xarray  # here, because it is optional and takes a second to load
+            import h5netcdf as h5netcdf  # here, because they are optional and take a second to load
+            import h5py
+            import xarray
         except ImportError as error:
             raise InputError("to_xarray() needs xarray: pip install xarray h5netcdf") from error
-        variables: dict[str, Any] = {
-            "axis": ("axis", list(AXES), AXIS_ATTRIBUTES),
-            "mjcf": ((), self.header.mjcf),
-        }
-        for table, time in ((self, "time"), (self.events, "event_time")):
-            for name, meta in columns(type(table)).items():
-                values = getattr(table, name)
-                variables[meta["name"]] = ((time, "axis")[: values.ndim], values, attributes(meta))
-        variables["omega_0"] = ("time", self.omega_0, attributes(FLUID))
-        schema = {"schema": SCHEMA, "schema_version": SCHEMA_VERSION}
-        return xarray.Dataset(variables, attrs=schema | self.header.attributes())
+        from model import storage
+
+        content = io.BytesIO()
+        with h5py.File(content, "w", track_order=True) as file:
+            storage.write(self, file)
+        return xarray.load_dataset(content, engine="h5netcdf")
 
     def table(self) -> dict[str, Array]:
         """Everything that a sample holds, number by number: forces split along `AXES` (force_Ax …),
@@ -215,20 +206,9 @@ class Trajectory:
     def from_blocks(
         cls, header: Header, blocks: list[npt.NDArray[np.void]], events: Events
     ) -> Self:
-        """Join blocks of samples, structured arrays of dtype `SAMPLE`.
-
-        They are taken out of the list one by one, so that most of what they hold is in memory once.
-        """
-        columns = {
-            name: np.empty((sum(map(len, blocks)), *meta["shape"]), meta["dtype"])
-            for name, meta in _SAMPLED
-        }
-        last = len(columns["time"])
-        while blocks:
-            block = blocks.pop()
-            for name, column in columns.items():
-                column[last - len(block) : last] = block[name]
-            last -= len(block)
+        """Join blocks of samples, structured arrays of dtype `SAMPLE`."""
+        blocks = [np.empty(0, SAMPLE), *blocks]
+        columns = {name: np.concatenate([block[name] for block in blocks]) for name, _ in _SAMPLED}
         return cls(header=header, events=events, **columns)
 
 

@@ -21,7 +21,7 @@ from compare.engines.adapters.vessel import scene_fields
 from model import Parameters, State, Trajectory
 from model.arrays import Array
 from model.files import check_ours, make_directory, write_text
-from model.hdf5 import WholeFile
+from model.hdf5 import writing
 from model.kinematics import to_world
 from model.versions import current_versions
 
@@ -52,8 +52,7 @@ def write(directory: Path) -> None:
     check_ours(directory / "README.md", beside=directory / "cases.h5")
     said = {"version": VERSION, "tolerance": TOLERANCE, "dualball": current_versions()["dualball"]}
     said |= {"count": len(cases()), "new": sum(bool(case.needs) for case in cases())}
-    with WholeFile(directory / "cases.h5") as whole:
-        file = whole.file
+    with writing(directory / "cases.h5") as file:
         file.attrs.update({"schema": "dualball-cases", "version": VERSION, "tolerance": TOLERANCE})
         for case in cases():
             data = case.to_mapping()
@@ -67,7 +66,6 @@ def write(directory: Path) -> None:
             group["time"].attrs["units"] = "s"
             columns = "position (m), velocity (m s-1), spin (rad s-1), of each body"
             group["exact"].attrs["columns"] = columns
-        whole.finish()
     write_text(directory / "README.md", README.read_text("utf-8").format(**said))
 
 

@@ -138,8 +138,7 @@ def store(
     """Carry out one task into a file of its own; return why the run is not whole, or nothing.
 
     A run that breaks down is kept under `failed_path`, until one into the same file is whole.
-    Samples of MuJoCo go to the file as they come. Once `stop` says so, a run ends as if it had
-    broken down. `tell` is called with the fraction done.
+    Once `stop` says so, a run ends as if it had broken down. `tell` is called with the share done.
 
     Raises
     ------
@@ -157,21 +156,22 @@ def store(
                 raise InterruptedError("interrupted")
 
         run = carry_out(task, check_stop)
-        failure = run.header.failure
-        storage.save(run, failed_path(path) if failure else path)
     else:
         under_way, stopped, reached = _start_stream(task, progress=tell), "", 0.0
-        with storage.TrajectoryWriter(path, under_way.header) as writer:
-            for block in under_way:
-                check(0.0)
-                writer.append(block)
-                # between rare samples blocks are empty
-                reached = block["time"].max(initial=reached)
-                if stop():
-                    stopped = f"was stopped at t = {reached:g} s"
-                    break
-            failure = under_way.header.failure or stopped
-            writer.end(under_way.events, failure, failed_path(path) if failure else path)
+        blocks = []
+        for block in under_way:
+            check(0.0)
+            blocks.append(block)
+            # between rare samples blocks are empty
+            reached = block["time"].max(initial=reached)
+            if stop():
+                stopped = f"was stopped at t = {reached:g} s"
+                break
+        failure = under_way.header.failure or stopped
+        header = dataclasses.replace(under_way.header, failure=failure)
+        run = Trajectory.from_blocks(header, blocks, under_way.events)
+    failure = run.header.failure
+    storage.save(run, failed_path(path) if failure else path)
     if not failure:
         failed_path(path).unlink(missing_ok=True)
     return failure

@@ -26,7 +26,7 @@ from compare.method.conditions import Conditions
 from compare.method.quantities import quantity
 from compare.method.statistics import COVERAGE, Estimate
 from model import Case, Parameters, StorageError
-from model.hdf5 import WholeFile, column, dataset, reading, write_columns
+from model.hdf5 import column, dataset, reading, write_columns, writing
 from model.kinematics import VARIABLES
 from model.versions import current_commit, current_versions
 
@@ -274,8 +274,8 @@ def save(records: Records, path: Path, about: Mapping[str, Any]) -> None:
         columns[f"at_{name}"] = values if text else np.array(values, float).tolist()
     for cause in dict.fromkeys(cause for m in rows for cause in m.budget):
         columns[f"u_{cause}"] = [float(m.budget.get(cause, math.nan)) for m in rows]
-    with WholeFile(path) as whole:
-        whole.file.attrs.update(
+    with writing(path) as file:
+        file.attrs.update(
             schema=SCHEMA,
             schema_version=SCHEMA_VERSION,
             about=json.dumps(dict(about)),
@@ -284,8 +284,7 @@ def save(records: Records, path: Path, about: Mapping[str, Any]) -> None:
             versions=json.dumps(dict(current_versions())),
             commit=current_commit(),
         )
-        write_columns(whole.file, columns, "row")
-        whole.finish()
+        write_columns(file, columns, "row")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -29,7 +29,7 @@ from compare.method.statistics import settled_case
 from compare.view import steady
 from model import Case, InputError, Parameters, StorageError, Trajectory, storage, table
 from model.files import check_writable
-from model.hdf5 import WholeFile, column, dataset, reading, write_columns
+from model.hdf5 import column, dataset, reading, write_columns, writing
 from model.kinematics import VARIABLES
 from model.trajectory import CONVENTIONS, attributes, columns
 from model.versions import current_versions
@@ -129,16 +129,15 @@ def _write(collected: Columns, output: Path) -> None:
             collected = axes | {
                 name: v.reshape(shape) for name, v in collected.items() if name not in axes
             }
-    with WholeFile(output) as whole:
+    with writing(output) as file:
         title = f"What {count} balls settled to, measured over the last part of each run"
-        whole.file.attrs.update(
+        file.attrs.update(
             Conventions=CONVENTIONS, title=title, schema=SCHEMA, schema_version=SCHEMA_VERSION
         )
-        for name, stored in write_columns(whole.file, collected, *dimensions).items():
+        for name, stored in write_columns(file, collected, *dimensions).items():
             stored.attrs.update(about[name])
             if dimensions == ["run"] and coordinates and name not in ("run", *coordinates):
                 stored.attrs["coordinates"] = " ".join(coordinates)  # of the CF convention
-        whole.finish()
 
 
 def _columns_of_files(directory: Path, files: Sequence[Path]) -> tuple[Columns, list[str]]:
@@ -186,14 +185,13 @@ def _rows(path: Path, shown: Path) -> Columns:
 
 def save_means(runs: Mapping[str, Trajectory], path: Path) -> None:
     """Write what runs settled to, by name, without samples; raises `StorageError`."""
-    with WholeFile(path) as whole:
-        whole.file.attrs.update(
+    with writing(path) as file:
+        file.attrs.update(
             schema=MEANS,
             schema_version=MEANS_VERSION,
             versions=json.dumps(dict(current_versions())),
         )
-        write_columns(whole.file, _means(runs), "run")
-        whole.finish()
+        write_columns(file, _means(runs), "run")
 
 
 def _means(runs: Mapping[str, Trajectory]) -> Columns:
@@ -205,7 +203,7 @@ def _means(runs: Mapping[str, Trajectory]) -> Columns:
         row |= dataclasses.asdict(about.parameters)
         row["duration"] = float(run.time[-1]) if len(run.time) else 0.0
         row["failure"] = about.failure
-        means = steady.last_quarter(run.time, run.x, about, len(run.time)) or (unknown, unknown)
+        means = steady.last_quarter(run) or (unknown, unknown)
         for variable, mean, drift in zip(VARIABLES, *means, strict=True):
             row |= {variable: mean, f"{variable}_uncertainty": drift}
         row["case"] = int(settled_case(run)) if len(run.case) else -1

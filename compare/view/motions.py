@@ -6,7 +6,6 @@ Each is first described as data, then shown."""
 from __future__ import annotations
 
 import dataclasses
-from collections import deque
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,8 +27,6 @@ if TYPE_CHECKING:  # it takes a second to load
 
 LISTED, LISTED_OF_TWO = 20, 8
 """Most phases, and most events, that are listed of one motion; most phases of one of two."""
-PART = 10_000
-"""Samples read at a time, so that a file may be larger than memory."""
 PAIR_COLOURS = "#0072B2", "#D55E00"
 SEEN = 1e-5
 """A gap in m below which it isn't drawn."""
@@ -39,35 +36,26 @@ def describe(path: Path) -> dict[str, Any]:
     """Parameters, versions, cases over time, events and last state of a stored run, JSON-able.
 
     Raises `StorageError` for a file that isn't a trajectory or isn't whole."""
-    samples, kept = 0, deque[Trajectory]()
-    stretches: list[tuple[Case, float, float]] = []
-    for last in storage.parts(path, PART):
-        samples += len(last.time)
-        kept.append(last)
-        while sum(len(part.time) for part in kept) - len(kept[0].time) > samples / 2:
-            kept.popleft()
-        for case, start, end in last.phases():
-            if stretches and stretches[-1][0] is case:
-                start = stretches.pop()[1]
-            stretches.append((case, start, end))
-    header, events = last.header, last.events
-    time, x = (np.concatenate([getattr(part, name) for part in kept]) for name in ("time", "x"))
-    settled = steady.last_quarter(time, x, header, samples)
+    run = storage.load(path)
+    header, events, samples = run.header, run.events, len(run.time)
+    settled = steady.last_quarter(run)
     return {
         **{name: getattr(header, name) for name in ("engine", "failure", "commit", "created")},
-        "complete": last.complete,
+        "complete": run.complete,
         "parameters": dataclasses.asdict(header.parameters),
         "flow": header.flow.to_mapping(),
         "settings": header.settings,
         "versions": header.versions,
         "samples": samples,
-        "duration": float(last.time[-1]) if samples else 0.0,
-        "cases": [{"case": case.name, "from": start, "to": end} for case, start, end in stretches],
+        "duration": float(run.time[-1]) if samples else 0.0,
+        "cases": [
+            {"case": case.name, "from": start, "to": end} for case, start, end in run.phases()
+        ],
         "events": [
             {"time": t, "from": Case(a).name, "to": Case(b).name}
             for t, a, b in zip(events.time, events.from_case, events.to_case, strict=True)
         ],
-        "last": dict(zip(VARIABLES, last.x[-1], strict=True)) if samples else {},
+        "last": dict(zip(VARIABLES, run.x[-1], strict=True)) if samples else {},
         "steady": steady.described(settled),
     }
 

@@ -14,7 +14,7 @@ import numpy as np
 import analytic
 from analytic.stationary.solutions import time_constant, time_taken_along
 from compare.method.statistics import steady_mean
-from model import Flow, Header, Parameters, Trajectory
+from model import Flow, Parameters, Trajectory
 from model.arrays import Array
 from model.kinematics import VARIABLES
 
@@ -42,14 +42,11 @@ def enough(sets: Sequence[Parameters]) -> tuple[float, float]:
     return unit * math.ceil(longest / unit), slowest
 
 
-def last_quarter(
-    time: Array, x: Array, header: Header, samples: int
-) -> tuple[list[float], list[float]] | None:
+def last_quarter(run: Trajectory) -> tuple[list[float], list[float]] | None:
     """Means of each state variable over the last quarter of a run, and how far they may be from
-    their limits; None for fewer than `FEWEST` samples.
-
-    time, x : the last samples, (n,) and (n, 8), at least half of all `samples`"""
-    length = int(QUARTER * samples)
+    their limits; None for fewer than `FEWEST` samples."""
+    time, x, header = run.time, run.x, run.header
+    length = int(QUARTER * len(time))
     if length < FEWEST:
         return None
     p = header.parameters.replace(omega_0=float(header.flow(time[-1])))
@@ -69,7 +66,7 @@ def described(
 
 def of_run(run: Trajectory) -> str:
     """`in_words` of a run that is at hand."""
-    found = described(last_quarter(run.time, run.x, run.header, len(run.time)))
+    found = described(last_quarter(run))
     lasts = float(run.time[-1]) if len(run.time) else 0.0
     return in_words(run.header.flow, lasts, found.get("omega_c"))
 

@@ -15,7 +15,7 @@ SLOW = Parameters.named("steel-in-water").replace(omega_0=5.0)
 @pytest.mark.parametrize("lasts", [5.0, 30.0, 100.0, 300.0, 900.0])
 def test_the_drift_tells_how_far_the_limit_is(lasts):
     run = analytic.simulate(SLOW, State(), lasts)
-    means, drifts = steady.last_quarter(run.time, run.x, run.header, len(run.time))
+    means, drifts = steady.last_quarter(run)
     error = abs(means[2] - SLOW.omega_0)
     assert error / 1.5 < drifts[2] < 5 * error
     share = steady.share(np.array(means[2]), np.array(drifts[2]), np.array(SLOW.omega_0))
@@ -28,7 +28,7 @@ def test_what_is_proposed_is_enough():
     assert slowest == pytest.approx((1 + 2 * p.j) / p.c)
     for each in (SLOW, p):
         run = analytic.simulate(each, State(), lasts)
-        means, _ = steady.last_quarter(run.time, run.x, run.header, len(run.time))
+        means, _ = steady.last_quarter(run)
         assert means[2] == pytest.approx(each.omega_0, rel=steady.DRIFT)
 
 

@@ -30,7 +30,7 @@ from model import (
     versions,
 )
 from model.files import write_text
-from model.hdf5 import seal
+from model.hdf5 import sealed
 from model.trajectory import SAMPLE, columns
 
 
@@ -71,7 +71,7 @@ def assert_same(a, b):
 
 
 @pytest.mark.parametrize(("n", "events"), [(50, 2), (0, 0), (1, 0), (5000, 7)])
-def test_what_is_saved_is_loaded_whole_or_in_parts(tmp_path, n, events):
+def test_what_is_saved_is_loaded(tmp_path, n, events):
     trajectory, path = make(n, events), tmp_path / "run.h5"
     storage.save(trajectory, path)
     assert_same(storage.load(path), trajectory)
@@ -79,13 +79,6 @@ def test_what_is_saved_is_loaded_whole_or_in_parts(tmp_path, n, events):
     # As a batch it is one of a run without a name.
     assert storage.contents(path)[1] == []
     assert_same(storage.load_runs(path)[""], trajectory)
-    for size in (n // 7 + 1, n + 1):
-        parts = list(storage.parts(path, size))
-        assert {len(part.time) for part in parts[:-1]} <= {size}
-        assert all(len(part.events) == events for part in parts)
-        for name in columns(Trajectory):
-            joined = np.concatenate([getattr(part, name) for part in parts])
-            np.testing.assert_array_equal(joined, getattr(trajectory, name))
 
 
 @pytest.mark.parametrize(("n", "events", "failure"), [(50, 2, ""), (0, 0, "diverged"), (1, 0, "")])
@@ -159,25 +152,6 @@ def test_a_table_has_a_row_for_each_sample_in_pandas_and_in_xarray(tmp_path):
         xarray.open_dataset(io.BytesIO(), engine=backend)
 
 
-def test_blocks_arrive_while_the_run_goes_on_and_leave_nothing_if_it_breaks_off(tmp_path):
-    blocks = np.array_split(np.zeros(50, SAMPLE), 7)
-    with storage.TrajectoryWriter(tmp_path / "run.h5", make().header) as writer:
-        for block in blocks:
-            writer.append(block)
-            assert not (tmp_path / "run.h5").exists()
-        writer.end(Events())
-    assert len(storage.load(tmp_path / "run.h5").time) == 50
-
-    def break_off():
-        with storage.TrajectoryWriter(tmp_path / "other.h5", make().header) as writer:
-            writer.append(blocks[0])
-            raise ZeroDivisionError
-
-    with pytest.raises(ZeroDivisionError):
-        break_off()
-    assert [each.name for each in tmp_path.iterdir()] == ["run.h5"]
-
-
 FULL = """
 import resource, sys
 from tests.model.test_storage import make
@@ -197,7 +171,7 @@ for size in (0, 40, 900, 3000, 20_000, 60_000, 90_000):
 
 
 def test_a_disk_that_fills_at_any_moment(tmp_path):
-    """In a process of its own, since HDF5 might crash it; a limit on the size of files plays the
+    """In a process of its own, which HDF5 might crash; a limit on the size of files plays the
     disk."""
     program, here = (
         [sys.executable, "-c", FULL, str(tmp_path / "run.h5")],
@@ -215,8 +189,7 @@ def edit(path, change):
     """Change what a file holds, and give it a checksum that fits."""
     with h5py.File(path, "r+") as file:
         change(file)
-    with path.open("r+b") as content:
-        seal(content)
+    path.write_bytes(sealed(path.read_bytes()))
 
 
 def replace(file, name, value):
@@ -246,8 +219,6 @@ def test_the_runs_of_a_batch_are_one_file(tmp_path):
     for name, run in BATCH.items():
         assert_same(loaded[name], run)
         assert_same(storage.load(path / name), run)
-        (part,) = storage.parts(path / name, 10)
-        assert_same(part, run)
     assert [storage.exists(each / "a") for each in (path, tmp_path / "other")] == [True, False]
     with xarray.open_dataset(path, engine="h5netcdf") as data:
         assert data.force_A.dims == ("run", "sample", "axis")
