@@ -25,9 +25,20 @@ def make_directory(path: Path) -> None:
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise StorageError(f"cannot write to {path}: {error.strerror}") from error
+        why = "it is a file" if path.is_file() else error.strerror
+        raise StorageError(f"cannot write to {path}: {why}") from error
     if not os.access(path, os.W_OK | os.X_OK):
         raise StorageError(f"cannot write to {path}: Permission denied")
+
+
+def why_no_file(path: str | Path) -> str:
+    """Why there is no file of that name to be read; nothing if there is one."""
+    of = Path(path)
+    if of.is_file():
+        return ""
+    if of.is_dir():
+        return "it is a directory"
+    return "it is not a file" if of.exists() else "there is no such file"
 
 
 def check_ours(path: Path, beside: Path) -> None:

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from model.errors import InputError, StorageError
-from model.files import write_bytes
+from model.files import why_no_file, write_bytes
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _SEAL = b"\ndualball sha256 "
@@ -55,10 +55,8 @@ def reading(path: str | Path, ours: bool = True) -> Iterator[h5py.File]:
     Raises `StorageError`, in one line that names the file, if it is missing, damaged, cut, changed,
     or foreign; an `InputError` or error of HDF5 within the context becomes one, too."""
     try:
-        if not Path(path).is_file():
-            raise StorageError(
-                "it is a directory" if Path(path).is_dir() else "there is no such file"
-            )
+        if why := why_no_file(path):
+            raise StorageError(why)
         with Path(path).open("rb") as stored:
             content = stored.read(-1 if ours else len(_SIGNATURE))
         if not content.startswith(_SIGNATURE):

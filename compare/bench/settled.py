@@ -18,6 +18,7 @@ import numpy as np
 from compare.bench.contact_law import Array, SoftContacts
 from model import InputError, StorageError
 from model.errors import few
+from model.files import why_no_file
 from model.parameters import ANY, Range, check_number, parse_number
 
 Control = Callable[[Any, Any], None]
@@ -65,8 +66,7 @@ def load(path: Path, keyframe: str | None = None) -> tuple[Any, Any]:
 
     Raises `StorageError` if there is no such file, `InputError` if MuJoCo refuses it, it is huge,
     it has no such keyframe, or its time step is shorter than `SHORTEST`."""
-    if not path.is_file():
-        why = "it is a directory" if path.is_dir() else "there is no such file"
+    if why := why_no_file(path):
         raise StorageError(f"cannot read {path}: {why}")
     try:  # MuJoCo takes a name as UTF-8, also where Python's file system has another encoding
         name = os.fsencode(path).decode("utf-8")

@@ -116,6 +116,8 @@ def basins(
     base = np.array(State(**start))
     states = np.tile(base, (len(y), len(x), 1))
     states[..., VARIABLES.index(across.name)], states[..., VARIABLES.index(up.name)] = x, y[:, None]
+    for x0 in states[[0, 0, -1, -1], [0, -1, 0, -1]]:  # at corners, before any is simulated
+        start_state(x0, p, Settings())
     few = states[::coarse, ::coarse] if coarse else states[:0, :0]
     tasks = [
         Task(
