@@ -32,7 +32,6 @@ from model.errors import check_type
 CLAIMS_SHARE = 2 / 3
 """Share of judging again's time that the claims take, about; the report takes the rest."""
 Announce = Callable[[Verdict], None]
-"""Called with every verdict as soon as it is there."""
 
 
 def validate(
@@ -50,8 +49,7 @@ def validate(
 ) -> list[Verdict]:
     """Measure with an engine and judge claims; store runs, measurements, summary, report.
 
-    What the directory holds already is not measured again. A claim is judged as soon as its
-    measurements are there.
+    What the directory holds already is not measured again.
 
     Parameters
     ----------
@@ -62,7 +60,7 @@ def validate(
     engine : the engine on trial, alone; the usual ones, MuJoCo on trial, for None
     workers : number of processes, or `Workers` of another kind
     limit : longest real time a run may take, s
-    progress, announce : called with how far it is, and with every verdict
+    progress, announce : called with how far it is, and with every verdict as soon as it is there
     report : whether to write the page with its figures
 
     Raises
@@ -112,8 +110,7 @@ class Study:
         ]
 
     def files(self, campaign: Campaign) -> results.Files:
-        """The files of all that is measured by this plan, for these claims or for others
-        before."""
+        """The files of all that is measured by this plan, now or before."""
         files: dict[str, dict[int, list[str]]] = {
             each.name: {n: [] for n in each.divisors} for each in self.engines
         }
@@ -137,11 +134,10 @@ def plan(
     if engine:
         engine.check()
     chosen = [each for each in select(CLAIMS, claims) if claims or each.level <= level]
-    names = [name for each in chosen for name in each.protocols]
-    if claims is None:
-        names = [protocol.name for protocol in PROTOCOLS]
+    asked = {name for each in chosen for name in each.protocols}
+    every = {protocol.name for protocol in PROTOCOLS}
+    needed = with_needed(PROTOCOLS, every if claims is None else asked)
     results.open_directory(output)
-    needed = with_needed(PROTOCOLS, names)
     free = [replace(FREE, role=Role.FREE_BODY)] if level > Level.QUICK else []
     engines = [engine] if engine else [*USUAL_ENGINES, *free]
     return Study(output, level, engines, chosen, needed, sets)

@@ -38,7 +38,7 @@ from model.versions import current_versions
 BATCH = 64
 """Most runs that a process takes at once, and stores in one file."""
 MOST_STEPS = 3e5
-"""Of a batch of several runs: some seconds, so that it is told how far they are."""
+"""Of a batch of several runs: some seconds, so that progress is told."""
 HELD = 2**16
 """Most samples of a batch, some 11 MB; a run with more is written as it comes."""
 READ = 2**19
@@ -53,25 +53,6 @@ Ended = tuple[str, Path | None, Trajectory | None]
 _BROKEN = ".failed.h5"
 _NAME = re.compile(r".+-([0-9a-f]{24})(\.failed)?\.h5")
 """Label, ID, and whether it broke down."""
-
-
-@dataclass(frozen=True)
-class Storing:
-    """Where and how the runs of a batch are stored."""
-
-    directory: Path
-    label: str
-    """What the names of files begin with."""
-    save: Save = storage.save_batch
-    passing: bool = False
-    """Whether whole runs of a batch of less than `SOON_DONE` are handed out instead."""
-
-    def store(self, runs: Mapping[str, Trajectory]) -> Path:
-        """Write whole runs, by key, into a file named by all of them."""
-        digest = hashlib.sha256(" ".join(runs).encode()).hexdigest()[:24]
-        path = self.directory / f"{self.label}-{digest}.h5"
-        self.save(runs, path)
-        return path
 
 
 @dataclass(frozen=True)
@@ -192,13 +173,9 @@ class Campaign:
         while runs:
             ends = np.cumsum([len(run.time) for run in runs.values()])
             some = [*runs][: max(1, int(np.searchsorted(ends, HELD, "right")))]
-            file = self._storing.store({key: runs.pop(key) for key in some})
+            own = {key: runs.pop(key) for key in some}
+            file = store_together(own, self.directory / self.label, self.save)
             self._files |= dict.fromkeys(some, file)
-
-    @property
-    def _storing(self) -> Storing:
-        """How workers are to store runs of the label as it is now."""
-        return Storing(self.directory, self.label, self.save, self.passing)
 
     def run(self, tasks: Sequence[Task]) -> list[Trajectory]:
         """Carry out what is not yet done and load the runs, one a task, in order.
@@ -218,8 +195,7 @@ class Campaign:
         The directory's `FAILURES` lists all that have failed in this campaign, for programs."""
         unique = {task.key: task for task in tasks}
         todo = [unique[key] for key in unique if key not in self._files and key not in self._read]
-        stored = [key for key in unique if key in self._files]
-        broken = [key for key in stored if self._files[key].name.endswith(_BROKEN)]
+        broken = [key for key in unique if self._files.get(key, Path()).name.endswith(_BROKEN)]
         failures = [Failure(unique[key], self.load(key).header.failure) for key in broken]
         done = len(unique) - len(todo) - len(failures)
         self.report(self.doing, done, len(unique), len(failures))
@@ -290,7 +266,8 @@ class Campaign:
                 fresh.append([again.popleft()])
             while fresh and len(pending) < 2 * self.fleet.count:
                 batch = fresh.popleft()
-                pending[self.fleet.submit(run_batch, batch, self._storing, self.limit)] = batch
+                how = self.directory / self.label, self.save, self.passing, self.limit
+                pending[self.fleet.submit(run_batch, batch, *how)] = batch
             for future in first_done(pending):
                 batch = pending.pop(future)
                 if future.cancelled():
@@ -307,11 +284,23 @@ class Campaign:
                     again.extend(batch)
 
 
-def run_batch(tasks: Sequence[Task], storing: Storing, limit: float) -> list[Ended]:
-    """Carry out tasks, each within so many s, and store them; raises `StorageError`."""
+def store_together(runs: Mapping[str, Trajectory], place: Path, save: Save) -> Path:
+    """Write whole runs, by key, into a file ``PLACE-ID.h5``, named by all of them."""
+    digest = hashlib.sha256(" ".join(runs).encode()).hexdigest()[:24]
+    path = Path(f"{place}-{digest}.h5")
+    save(runs, path)
+    return path
+
+
+def run_batch(
+    tasks: Sequence[Task], place: Path, save: Save, passing: bool, limit: float
+) -> list[Ended]:
+    """Carry out tasks, each within so many s, and store them; raises `StorageError`.
+
+    Where most are removed (`passing`) whole runs are handed out instead, unless they took long."""
     begun, whole, ended = time.process_time(), dict[str, Trajectory](), dict[str, Ended]()
     for task in tasks:
-        path = storing.directory / f"{storing.label}-{task.key}.h5"
+        path = Path(f"{place}-{task.key}.h5")
         try:
             if task.long or task.samples > HELD:
                 failure = store(task, path, limit)
@@ -328,8 +317,8 @@ def run_batch(tasks: Sequence[Task], storing: Storing, limit: float) -> list[End
         else:
             storage.save(run, failed_path(path))
             ended[task.key] = run.header.failure, failed_path(path), None
-    if storing.passing and time.process_time() - begun < SOON_DONE:
+    if passing and time.process_time() - begun < SOON_DONE:
         ended |= {key: ("", None, run) for key, run in whole.items()}
     elif whole:
-        ended |= dict.fromkeys(whole, ("", storing.store(whole), None))
+        ended |= dict.fromkeys(whole, ("", store_together(whole, place, save), None))
     return [ended[task.key] for task in tasks]

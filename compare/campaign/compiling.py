@@ -46,11 +46,12 @@ def listen() -> int:
     often compiling has begun, -1 before."""
     dispatcher = sys.modules.get("numba.core.dispatcher")
     if _heard.times < 0 and hasattr(dispatcher, "Dispatcher"):
-        event = sys.modules["numba.core.event"]
+        event, caching = (sys.modules[f"numba.core.{name}"] for name in ("event", "caching"))
 
         class Listener(event.Listener):  # type: ignore[misc, name-defined]
             def on_start(self, event: Any) -> None:
-                _heard.here.append(_words(event.data["dispatcher"]))
+                kept = not isinstance(event.data["dispatcher"]._cache, caching.NullCache)
+                _heard.here.append(KEPT if kept else NOT_KEPT)
                 _heard.times += 1
 
             def on_end(self, event: Any) -> None:
@@ -59,11 +60,6 @@ def listen() -> int:
         event.register("numba:compile", Listener())
         _heard.times = 0
     return _heard.times
-
-
-def _words(dispatcher: Any) -> str:
-    kept = not isinstance(dispatcher._cache, sys.modules["numba.core.caching"].NullCache)
-    return KEPT if kept else NOT_KEPT
 
 
 def here() -> str:

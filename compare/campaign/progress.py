@@ -24,7 +24,6 @@ from model.errors import few
 INTERVAL = 10.0
 """Seconds between plain lines."""
 READY = "getting ready"
-"""What is said before anything else is."""
 DRAWING = 0.1
 """Share of a validation's time that drawing its figures takes, about."""
 BY_THE_TABLE = 60.0
@@ -98,8 +97,7 @@ def reporter(quiet: bool = False, counted: bool = False) -> Iterator[Show]:
     `INTERVAL`, and at first than `SOON`; nor of compiling.
 
     `counted` if what is done are runs, whose number is to be shown, too. As long as the total is 0
-    all is being made ready, and nothing is said of the time that is left.
-    """
+    nothing is said of the time that is left."""
     if quiet:
         yield show_nothing
     elif counted:
@@ -177,26 +175,20 @@ class ValidationProgress:
         self._noted = self.began
 
     def measuring(self, protocol: str, done: int, total: int, failed: int) -> None:
-        """Note how many runs of a protocol are done, how many are known so far, and how many
-        failed."""
-        with self._lock:
-            self._note_time()
+        """Note how many runs of a protocol are done, known so far, and failed."""
+        with self._noting():
             self._under_way[protocol] = done, total, failed
-            self._tell()
 
     def measured(self, protocol: str) -> None:
         """Note that a protocol is done."""
-        with self._lock:
-            self._note_time()
+        with self._noting():
             self._under_way.pop(protocol, None)
             self._measured.add(protocol)
-            self._tell()
 
     def judged(self) -> None:
         """Note that one more claim is judged."""
-        with self._lock:
+        with self._noting():
             self._judged += 1
-            self._tell()
 
     def drawing(self, over: Spread) -> Spread:
         """A `map` for figures that shows how many are drawn."""
@@ -204,10 +196,8 @@ class ValidationProgress:
 
         def counted(one: Callable[[Any], Any], items: Iterable[Any]) -> Iterator[Any]:
             todo = list(items)
-            for k, result in enumerate(over(one, todo)):
-                self._show(
-                    f"drawing figures: {k + 1} of {len(todo)}", whole * (1 - (k + 1) / len(todo))
-                )
+            for n, result in enumerate(over(one, todo), start=1):
+                self._show(f"drawing figures: {n} of {len(todo)}", whole * (1 - n / len(todo)))
                 yield result
 
         self._show("drawing figures", whole)
@@ -216,36 +206,30 @@ class ValidationProgress:
     def left(self) -> float:
         """Seconds that are left of measuring and drawing: what isn't done yet, at the pace of the
         protocols that are or should be, which counts for little at first."""
-        done = [
-            name for name in self.costs
-            if name in self._measured or self._spent[name] > self.costs[name]
-        ]  # fmt: skip
+        todo = [name for name in self.costs if name not in self._measured]
+        late = {name for name in todo if self._spent[name] > self.costs[name]}
+        done = [name for name in self.costs if name in self._measured | late]
         spent, cost = (sum(of[name] for name in done) for of in (self._spent, self.costs))
         pace = (spent + BY_THE_TABLE) / (cost + BY_THE_TABLE)
-        rest = sum(
-            max(pace * cost - self._spent[name], LATE * pace * cost)
-            for name, cost in self.costs.items()
-            if name not in self._measured
-        )
+        takes = {name: pace * self.costs[name] for name in todo}
+        rest = sum(max(takes[name] - self._spent[name], LATE * takes[name]) for name in todo)
         left = rest / self.workers
         return left + DRAWING * (time.monotonic() - self.began + left)
 
-    def _note_time(self) -> None:
-        """Share out the time since the last note among the protocols under way."""
-        passed, self._noted = time.monotonic() - self._noted, time.monotonic()
-        for name in self._under_way:
-            self._spent[name] += passed * self.workers / max(len(self._under_way), self.workers)
-
-    def _tell(self) -> None:
-        """Show how far claims and protocols are."""
-        runs = [
-            f"{name} {done}/{total}"
-            for name, (done, total, _) in self._under_way.items()
-            if done < total
-        ]
-        what = f"{self._judged} of {self.claims} claims judged"
-        measuring = f"; measuring {few(runs)}" if runs else ""
-        self._show(what + measuring, self.left(), sum(bad for *_, bad in self._under_way.values()))
+    @contextmanager
+    def _noting(self) -> Iterator[None]:
+        """A context to note something in: the time since the last note is shared out among the
+        protocols under way, and in the end it is shown how far all is."""
+        with self._lock:
+            passed, self._noted = time.monotonic() - self._noted, time.monotonic()
+            for name in self._under_way:
+                self._spent[name] += passed * self.workers / max(len(self._under_way), self.workers)
+            yield
+            now = self._under_way.items()
+            runs = [f"{name} {done}/{total}" for name, (done, total, _) in now if done < total]
+            what = f"{self._judged} of {self.claims} claims judged"
+            measuring = f"; measuring {few(runs)}" if runs else ""
+            self._show(what + measuring, self.left(), sum(bad for _, (*_, bad) in now))
 
     def _show(self, what: str, left: float, failed: int = 0) -> None:
         passed = time.monotonic() - self.began

@@ -40,8 +40,7 @@ class Task:
     parameters: Parameters
     x0: npt.ArrayLike
     """Initial state, 6 or 8 numbers; kept as a `State`."""
-    t_end: float
-    """s"""
+    t_end: float  # s
     flow: Flow | None = None
     """omega_0 over time; None for a steady ``parameters.omega_0``."""
     settings: Any = None
@@ -52,10 +51,9 @@ class Task:
     def __post_init__(self) -> None:
         if not isinstance(self.settings, self.simulator.settings | None):
             raise InputError(f"settings of another engine were given to {self.engine!r}")
+        settings = self.settings or self.simulator.configure({}, self.parameters)
         object.__setattr__(self, "x0", State.one(self.x0))
-        object.__setattr__(
-            self, "settings", self.settings or self.simulator.configure({}, self.parameters)
-        )
+        object.__setattr__(self, "settings", settings)
 
     @property
     def simulator(self) -> Engine:
@@ -138,14 +136,9 @@ def store(
     """Carry out one task into a file of its own; return why the run is not whole, or nothing.
 
     A run that breaks down is kept under `failed_path`, until one into the same file is whole.
-    Once `stop` says so, a run ends as if it had broken down. `tell` is called with the share done.
-
-    Raises
-    ------
-    StorageError
-        If a file can't be written.
-    TimeoutError
-        If it takes longer than `limit` s."""
+    Once `stop` says so, a run ends as if it had broken down. `tell` is called with the fraction
+    done. Raises `StorageError` if a file can't be written, `TimeoutError` if it takes longer than
+    `limit` s."""
     check = deadline(limit)
     if task.simulator.simulate:
 

@@ -10,16 +10,9 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Collection, Iterable, Iterator
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    CancelledError,
-    Executor,
-    Future,
-    ProcessPoolExecutor,
-    ThreadPoolExecutor,
-    wait,
-)
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
+from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
+from concurrent.futures.thread import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import get_context, parent_process, resource_tracker
@@ -244,7 +237,7 @@ def dask(address: str) -> Workers:
 
 @contextmanager
 def threads(count: int) -> Iterator[ThreadPoolExecutor]:
-    """A context with a pool of threads for which an error doesn't wait: they end by themselves."""
+    """A context with threads for which an error doesn't wait: they end by themselves."""
     pool = ThreadPoolExecutor(count)
     try:
         yield pool
@@ -271,23 +264,18 @@ class LateError(BaseException):
 @contextmanager
 def at_most(limit: float) -> Iterator[None]:
     """Raise `LateError` once more than `limit` s of processor time have passed in which nothing was
-    compiled.
-
-    In the main thread of a process, where signals arrive; elsewhere, and on Windows, there is no
-    limit."""
+    compiled; in the main thread, where signals arrive, and not on Windows."""
     if sys.platform == "win32" or threading.current_thread() is not threading.main_thread():
         yield
         return
-
     heard = compiling.listen()
 
     def raise_late(*_: object) -> None:
         nonlocal heard
         last, heard = heard, compiling.listen()
-        if heard > last or compiling.here():
-            signal.setitimer(signal.ITIMER_VIRTUAL, limit)
-            return
-        raise LateError(f"it took longer than {limit:g} s")
+        if heard == last and not compiling.here():
+            raise LateError(f"it took longer than {limit:g} s")
+        signal.setitimer(signal.ITIMER_VIRTUAL, limit)
 
     before = signal.signal(signal.SIGVTALRM, raise_late)
     signal.setitimer(signal.ITIMER_VIRTUAL, limit)

@@ -96,9 +96,7 @@ def narrow(runner: Runner, searches: Sequence[Search], careful: bool = True) -> 
     asked.granted_ends()
     if careful:
         asked.ends_with_half_the_step()
-    failures = [asked.failures.get(search, "") for search in searches]
-    both = zip(asked.brackets, failures, strict=True)
-    return [replace(bracket, failure=failure) for bracket, failure in both]
+    return asked.brackets
 
 
 class _Narrowing:
@@ -106,11 +104,10 @@ class _Narrowing:
 
     def __init__(self, runner: Runner, searches: Sequence[Search]) -> None:
         self.runner, self.searches = runner, searches
-        self.brackets = [search.bracket for search in searches]
+        # one that was narrowed down before, with another question, may have had a run break down
+        self.brackets = [replace(search.bracket, failure="") for search in searches]
         self.before = list(self.brackets)
         """Those of the round before."""
-        self.failures = dict[Search, str]()
-        """Why a run of a search broke down."""
 
     def rounds(self) -> None:
         """Ask inside all brackets that are too wide, until none is or runs show no more."""
@@ -149,14 +146,14 @@ class _Narrowing:
     def answers(self, asked: Sequence[tuple[int, float]], how: Attempt = USUAL) -> list[Reply]:
         """Carry out a run for each question, the number of a search and a value; those without an
         answer anew for longer."""
-        replies, searches = [], [self.searches[k] for k, _ in asked]
+        replies = []
         tasks = [self.searches[k].task(value, self.brackets[k], how) for k, value in asked]
-        for search, task, run in zip(searches, tasks, self.runner.each(tasks), strict=True):
+        for (k, _), task, run in zip(asked, tasks, self.runner.each(tasks), strict=True):
             if isinstance(run, str):
-                self.failures[search] = run
+                self.brackets[k] = replace(self.brackets[k], failure=run)
                 replies.append(Reply(task, None, None))
             else:
-                replies.append(Reply(task, run, search.answer(run)))
+                replies.append(Reply(task, run, self.searches[k].answer(run)))
         unclear = [n for n, reply in enumerate(replies) if reply.run and reply.answer is None]
         if how is USUAL and unclear:
             longer = self.answers([asked[n] for n in unclear], LONGER)
@@ -176,4 +173,5 @@ def _narrowed(bracket: Bracket, values: Sequence[float], replies: Sequence[Reply
     no = said.index(False, max(undecided, default=yes))
     by = tuple(reply.task for reply in replies[max(yes - 1, 0) : no])
     all_said = *bracket.said, *zip(values, answers, strict=True)
-    return Bracket(places[yes], places[no], (shown[yes], shown[no]), by, said=all_said)
+    seen = shown[yes], shown[no]
+    return replace(bracket, low=places[yes], high=places[no], runs=seen, tasks=by, said=all_said)

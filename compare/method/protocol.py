@@ -115,15 +115,13 @@ class Job:
         return self.results / DIRECTORY / self.origin.plan / f"{self.protocol.name}.h5"
 
 
-def with_needed(protocols: Iterable[Protocol], names: Iterable[str]) -> list[Protocol]:
-    """The protocols of these names and all that they need, as `PLAN` orders them."""
+def with_needed(protocols: Sequence[Protocol], names: Iterable[str]) -> list[Protocol]:
+    """The protocols of these names and all that they need, as `PLAN` orders them; of all
+    `protocols`, each of which goes out only from those before it."""
+    wanted = set(names)
+    for protocol in reversed(protocols):
+        wanted.update(protocol.needs if protocol.name in wanted else ())
     known = {protocol.name: protocol for protocol in protocols}
-    wanted, todo = set[str](), list(names)
-    while todo:
-        name = todo.pop()
-        if name not in wanted:
-            wanted.add(name)
-            todo += known[name].needs
     return [known[name] for name in PLAN if name in wanted]
 
 

@@ -19,18 +19,9 @@ from compare.engines.study import Engine, engine
 from compare.method.quantities import quantity
 from compare.method.record import Check, Missing, Records, RecordsByEngine, Relation
 from compare.method.runner import coarse_step
+from compare.verification import judge
 from compare.verification.claim import Claim, EngineVerdict, Outcome, Verdict
-from compare.verification.convergence import Ends, zero_step_limits
-from compare.verification.judge import (
-    checks_of,
-    counted,
-    covered,
-    inconclusive_criteria,
-    lost_to,
-    outcome,
-    per_criterion,
-    verdict,
-)
+from compare.verification.convergence import Ends, series_by_step, zero_step_limit
 
 USUAL_STEP = 2e-3
 """MuJoCo's own time step, s, at which users meet its deviations."""
@@ -45,7 +36,7 @@ def full_verdict(claim: Claim, evidence: RecordsByEngine) -> Verdict:
     thresholds = measured.select("thresholds", where=lambda m: quantity(m.quantity).threshold)
     ends = {(m.set, m.value) for m in thresholds}
     if len(steps) == 1 and not engine(name).relative_tolerance:
-        said = verdict(claim, measured)
+        said = judge.verdict(claim, measured)
         first = EngineVerdict(
             engine=name,
             outcome=Outcome.NOT_ASKED if said.outcome is Outcome.NOT_RUN else said.outcome,
@@ -79,20 +70,16 @@ def assess(
 
     Nothing, where theory breaks down, or no protocol of the claim was asked of it. Else it leaves
     the claim inconclusive where too few of its numbers can tell; without a limit none can."""
-    planned = [
-        (n, row)
-        for n, own in sorted(steps.items())
-        for row in own.rows
-        if row.protocol in claim.protocols
-    ]
+    rows = ((n, row) for n, own in sorted(steps.items()) for row in own.rows)
+    planned = [(n, row) for n, row in rows if row.protocol in claim.protocols]
     finest = {row.protocol: n for n, row in planned}
     asked = {(row.protocol, row.set) for _, row in planned}
-    lost = [each for own in steps.values() for each in lost_to(claim, own)]
+    lost = [each for own in steps.values() for each in judge.lost_to(claim, own)]
     missing = lost + [
         row for n, row in planned if isinstance(row, Missing) and n == finest[row.protocol]
     ]
     try:
-        found = {n: checks_of(claim, own) for n, own in steps.items()}
+        found = {n: judge.checks_of(claim, own) for n, own in steps.items()}
     except Exception as error:  # a theory that breaks down loses its claim, whoever measured
         reason = f"{type(error).__name__}: {error}"
         return EngineVerdict(engine=by.name, outcome=Outcome.ERROR, reason=reason)
@@ -103,15 +90,16 @@ def assess(
         why = "at this level nothing that bears on the claim was asked of it"
         reason = "; ".join([why, *map(str, missing[:SEVERAL])])
         return EngineVerdict(
-            engine=by.name, outcome=Outcome.NOT_ASKED, reason=reason, missing=counted(missing)
+            engine=by.name, outcome=Outcome.NOT_ASKED, reason=reason, missing=judge.counted(missing)
         )
     if by.relative_tolerance:
         checks, orders = _loosened(found[max(found)], by.relative_tolerance), []
     else:
-        limits = zero_step_limits(found, finest, ends)
-        checks = tuple(covered(check for check, _ in limits))
+        every = (zero_step_limit(series, ends) for series in series_by_step(found, finest))
+        limits = [limit for limit in every if limit]
+        checks = tuple(judge.covered(check for check, _ in limits))
         orders = [order for _, order in limits if math.isfinite(order)]
-    most = reduce(or_, map(per_criterion, found.values()))
+    most = reduce(or_, map(judge.per_criterion, found.values()))
     wanted = most | Counter(n for n, _ in shared) | Counter({check.criterion for check in trial})
     few = _too_few(claim, checks, wanted, missing)
     usual = (
@@ -122,12 +110,12 @@ def assess(
     )
     return EngineVerdict(
         engine=by.name,
-        outcome=outcome(claim, checks, wanted, lost),
+        outcome=judge.outcome(claim, checks, wanted, lost),
         reason=few or "; ".join(map(str, lost[:SEVERAL])),
         checks=checks,
         order=median(orders) if orders else math.nan,
         deviations=_deviations(usual),
-        missing=counted(missing),
+        missing=judge.counted(missing),
         left_out=sum(each.rows for each in missing) + most.total() - len(checks),
     )
 
@@ -146,7 +134,7 @@ def _too_few(
     claim: Claim, checks: Sequence[Check], wanted: Counter[int], missing: Sequence[Missing]
 ) -> str:
     """In words of which criteria too few numbers can tell, and why; empty if of none."""
-    if not (few := inconclusive_criteria(checks, wanted)):
+    if not (few := judge.inconclusive_criteria(checks, wanted)):
         return ""
     symbols: dict[str, list[str]] = {}
     for n, told in sorted(few.items()):

@@ -24,8 +24,8 @@ from compare.method.statistics import Estimate
 from compare.plan import Level, sets
 
 When = Callable[[Measurement], bool]
-Prediction = float | Estimate
-"""A predicted value, with its own uncertainty where it comes from an integrator."""
+Predict = Callable[[Measurement], float | Estimate]
+"""Predicts a value, with its own uncertainty where it comes from an integrator."""
 
 
 class Outcome(StrEnum):
@@ -66,7 +66,7 @@ class Criterion:
 
     protocol: str
     quantity: str
-    predict: Callable[[Measurement], Prediction]
+    predict: Predict
     """Raises one of `judge.UNKNOWN` where theory knows no such state."""
     _: KW_ONLY
     when: When = lambda m: True
@@ -125,10 +125,7 @@ class Claim:
 
 
 def criteria(
-    protocol: str,
-    quantities: Iterable[str],
-    predict: Callable[[Measurement], Prediction],
-    **more: Any,
+    protocol: str, quantities: Iterable[str], predict: Predict, **more: Any
 ) -> tuple[Criterion, ...]:
     """A `Criterion` for each of several quantities of a protocol, all predicted by one function."""
     return tuple(Criterion(protocol, quantity, predict, **more) for quantity in quantities)
@@ -148,6 +145,8 @@ class Judged:
 
     outcome: Outcome
     checks: tuple[Check, ...] = ()
+    missing: tuple[Missing, ...] = ()
+    """What its protocols left out, and why."""
 
     @property
     def worst(self) -> float:
@@ -170,8 +169,7 @@ class Judged:
 
 @dataclass(frozen=True, kw_only=True)
 class EngineVerdict(Judged):
-    """What one engine says of a claim: by checks in the zero-step limit, where it is judged
-    so."""
+    """What one engine says of a claim: by checks in the zero-step limit, where it is judged so."""
 
     engine: str
     reason: str = ""
@@ -181,8 +179,6 @@ class EngineVerdict(Judged):
     deviations: tuple[float, ...] = ()
     """Sizes of deviations, divided by their scales, of numbers that are sure enough to tell them:
     at MuJoCo's own step of 2 ms, or of an engine that is judged at one step at that."""
-    missing: tuple[Missing, ...] = ()
-    """What its protocols left out, and why."""
     left_out: int = 0
     """Measurements that they left out, or that have no limit."""
 
@@ -204,8 +200,6 @@ class Verdict(Judged):
     claim: Claim
     error: str = ""
     """Why it could not be judged."""
-    missing: tuple[Missing, ...] = ()
-    """What its protocols left out, and why."""
     engines: tuple[EngineVerdict, ...] = ()
     """What every engine says, the one on trial first."""
 

@@ -102,14 +102,6 @@ class StepSeries:
         return coarse_step(p) / shortest / np.array(self.divisors, float)
 
 
-def zero_step_limits(
-    found: Mapping[int, Sequence[Check]], finest: Mapping[str, int], ends: Ends
-) -> list[Limit]:
-    """The limits of all checks, by step divisor; `finest` is that of each protocol."""
-    limits = (zero_step_limit(series, ends) for series in series_by_step(found, finest))
-    return [limit for limit in limits if limit]
-
-
 def zero_step_limit(series: StepSeries, ends: Ends = frozenset()) -> Limit | None:
     """A check extrapolated to a zero time step; None where it has no limit.
 
@@ -232,7 +224,9 @@ def _polynomial_limit(steps: Array, errors: Array, own: Array, lowest: int) -> E
 def series_by_step(
     found: Mapping[int, Sequence[Check]], finest: Mapping[str, int]
 ) -> Iterator[StepSeries]:
-    """Each check with its protocol's finest step, and those with coarser ones."""
+    """Each check with its protocol's finest step, and those with coarser ones.
+
+    By step divisor; `finest` is that of each protocol."""
     groups: dict[Alike, dict[int, list[Check]]] = {}
     for divisor in sorted(found):
         for check in found[divisor]:

@@ -20,7 +20,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from compare.campaign.campaign import FAILURES, Campaign, Failure, Storing, run_batch
+from compare.campaign.campaign import FAILURES, Campaign, Failure, run_batch
 from compare.campaign.lock import Lock
 from compare.campaign.tasks import Task
 from compare.campaign.workers import Workers, _without_signals, dask, first_done, processes
@@ -159,7 +159,7 @@ def test_what_memory_cannot_hold_goes_into_files_as_long_as_a_batch(tmp_path, mo
 
 
 def test_runs_that_are_stored_are_not_handed_out(tmp_path):
-    ended = run_batch(tasks(2), Storing(tmp_path, "runs", collection.save_means), math.inf)
+    ended = run_batch(tasks(2), tmp_path / "runs", collection.save_means, False, math.inf)
     assert [(reason, run) for reason, _, run in ended] == [("", None)] * 2
     assert len({file for _, file, _ in ended}) == 1
 
