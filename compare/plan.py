@@ -25,7 +25,7 @@ import numpy as np
 from compare.campaign.sweep import sobol
 from compare.engines.study import MOREAU, Engine, Role
 from model import Parameters
-from model.drag import QUADRATIC, SCHILLER_NAUMANN, STOKES
+from model.drag import QUADRATIC, SCHILLER_NAUMANN
 
 
 class Level(IntEnum):
@@ -48,10 +48,9 @@ LIMIT_SETS = (*ENDS_OF_ROLLING, "rough-floor", "wake")
 """Both ends of rolling, a floor rough enough for balls that slip and balls that ride the wall at
 one flow, a law of drag."""
 VARIED = (*ENDS_OF_ROLLING, "rough-floor", "thick-fluid", "wake", "blunt", "rubber-wall")
-"""Each for a reason: the two above; a floor rough enough for balls that slip and balls that ride
-the wall at one flow; drag so strong that nothing folds; two other laws of drag; friction of the
-wall above that of the floor and the inertia. On them all wrong theories are noticed that are
-noticed on all nine sets chosen by hand."""
+"""Those above; drag so strong that nothing folds; another law of drag; friction of the wall above
+that of the floor and the inertia. On them all wrong theories are noticed that are noticed on all
+nine sets chosen by hand."""
 MOST_LIMIT_SETS = 12
 """Sets, at most, that engines in the zero-step limit measure above the quick level."""
 
@@ -143,8 +142,7 @@ PLAN: dict[str, Entry] = {
 
 
 def planned(protocol: str, engine: Engine, divisor: int, level: Level) -> dict[str, Parameters]:
-    """The sets that a protocol measures at a level, by an engine whose time steps are divided so,
-    by name."""
+    """The sets that a protocol measures at a level, by an engine with such a step; by name."""
     entry, known, above = PLAN[protocol], sets(level), level > Level.QUICK
     names: Iterable[str] = known if above else entry.trial
     if engine.role is Role.AS_IT_COMES:
@@ -167,29 +165,24 @@ HIGH = {"mu": 1.0, "eta": 1.0, "j": 0.66, "r/R": 0.4, "kappa": 0.4, "R": 0.08, "
 """Ranges of the design; lengths in m, masses in kg, g in m s-2."""
 
 # fmt: off
-_FIELDS = ("m", "r", "R", "j", "mu", "eta", "g", "c", "nu_f")
-_CHOSEN: dict[str, tuple[float, ...]] = {
+_FIELDS = ("m", "r", "R", "j", "mu", "eta", "g", "c", "nu_f", "drag")
+_CHOSEN: dict[str, tuple[Any, ...]] = {
     "rough-floor": (0.02, 0.012,  0.06,  0.3, 0.45, 0.15, 9.81, 2.0),
     "rough-wall":  (0.05, 0.015,  0.05, 0.55, 0.15, 0.35,  8.0, 1.5),
     "thick-fluid": (0.03, 0.008,  0.04, 0.45, 0.25,  0.1,  9.0, 5.0),
     "heavy-core":  (0.01,  0.02,  0.07, 0.25,  0.7,  0.5,  9.5, 2.5),
-    "wake":        (0.02, 0.012,  0.06, 0.42,  0.5,  0.2,  9.0, 1.4, 8e-05),
-    "blunt":       (0.03,  0.01,  0.05,  0.4,  0.5,  0.2,  8.5, 1.2, 4e-05),
+    "wake":        (0.02, 0.012,  0.06, 0.42,  0.5,  0.2,  9.0, 1.4, 8e-05, SCHILLER_NAUMANN),
+    "blunt":       (0.03,  0.01,  0.05,  0.4,  0.5,  0.2,  8.5, 1.2, 4e-05, QUADRATIC),
     "rubber-wall": (0.04,  0.01, 0.055, 0.35,  0.3,  0.8,  7.0, 3.0),
 }
 # fmt: on
-_DRAG = {"wake": SCHILLER_NAUMANN, "blunt": QUADRATIC}
-"""The laws of those that have another than Stokes'."""
 
 
 def sets(level: Level) -> dict[str, Parameters]:
     """The sets of a level by name."""
-    named = {name: Parameters.named(name) for name in ("reference", "high-wall-friction")}
-    chosen = {}
-    for name, row in _CHOSEN.items():
-        values: dict[str, Any] = dict(zip(_FIELDS, row, strict=False))
-        chosen[name] = Parameters(**values, omega_0=1.0, drag=_DRAG.get(name, STOKES))
-    sets = named | chosen
+    sets = {name: Parameters.named(name) for name in ("reference", "high-wall-friction")}
+    for name, chosen in _CHOSEN.items():
+        sets[name] = Parameters(**dict(zip(_FIELDS, chosen, strict=False)), omega_0=1.0)
     if level > Level.QUICK:  # a scrambled Sobol sequence fills the box evenly
         low, high = np.array(list(LOW.values())), np.array(list(HIGH.values()))
         unit = sobol(len(LOW), COUNT[level] - len(sets), SEED)

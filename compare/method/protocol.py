@@ -29,9 +29,9 @@ from model.files import make_directory
 DIRECTORY = "measurements"
 UNDAMPED = "without drag (c = 0 s-1) no motion settles, and nothing can be measured"
 LONGEST_WAIT = 3e4
-"""Coarse time steps in 1/c up to which a protocol waits for motions to settle. It waits for 40/c or
-more at a time; and contact forces are solved to 1e-12 in each step, so that all that adds up in 1/c
-is three times that: as much as `omega_c` may be off in a state that counts as settled."""
+"""Coarse time steps in 1/c up to which a protocol waits for motions to settle: 40/c or more at a
+time. Contact forces are solved to 1e-12 in each step; what adds up in 1/c is as much as `omega_c`
+may be off in a state that counts as settled."""
 SOURCES = "compare.engines.study", "compare.campaign", "compare.plan", "compare.method"
 """What all measurements are made by; those of an older program are not taken for new ones."""
 Measure = Callable[[Runner, Sets, Records], Measured]
@@ -85,12 +85,12 @@ class Job:
     @property
     def cost(self) -> float:
         """About its processor time at the quick level on some machine, s."""
-        name, engine, divisor = self.protocol.name, self.runner.engine, self.runner.divisor
+        entry, engine, divisor = PLAN[self.protocol.name], self.runner.engine, self.runner.divisor
         if not self.runner.has_own_steps:
-            return PLAN[name].seconds
-        share = len(planned(name, engine, divisor, Level.QUICK)) / len(PLAN[name].trial)
+            return entry.seconds
+        share = len(planned(self.protocol.name, engine, divisor, Level.QUICK)) / len(entry.trial)
         pace = LAWLESS if engine.role is Role.IN_THE_LIMIT else 1.0
-        return PLAN[name].seconds * share * divisor * pace
+        return entry.seconds * share * divisor * pace
 
     @cached_property
     def origin(self) -> Origin:
@@ -127,11 +127,10 @@ def with_needed(protocols: Sequence[Protocol], names: Iterable[str]) -> list[Pro
 
 def run(jobs: Sequence[Job]) -> Iterator[tuple[Job, Records | Exception]]:
     """Carry out protocols, some at once if they need nothing of each other, those in front first;
-    yield each as it ends, with its records.
+    yield each as it ends, with its records, or with the exception by which it broke down.
 
-    A protocol that breaks down comes with its exception, and so do those that need it: what they
-    measured without it would be kept, and taken for whole the next time. Raises `StorageError`
-    where files can't be read or written."""
+    So do those that need it: what they measured without it would be kept, and taken for whole the
+    next time. Raises `StorageError` where files can't be read or written."""
     if not jobs:
         return
     known = {job.name: job for job in jobs}
@@ -198,9 +197,8 @@ def lacking(job: Job, rows: Sequence[Measurement | Missing]) -> Counter[Planned]
 def carry_out(job: Job, before: Records) -> Records:
     """What a protocol measures after others; what is kept is not measured again.
 
-    Once its measurement file is there, only the runs that a figure draws are kept.
-
-    Raises `StorageError` where measurements can't be read or written, or are another engine's."""
+    In the end only the runs that a figure draws are kept. Raises `StorageError` where measurements
+    can't be read or written, or are another engine's."""
     path, protocol, entry = job.file, job.protocol, PLAN[job.protocol.name]
     label = f"{protocol.name}-{path.parent.name}"
     campaign = job.runner.campaign.part(label, job.name)

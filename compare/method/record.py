@@ -1,8 +1,6 @@
 """Measurements as data, the file that keeps them, and a measured number beside a predicted one.
 
-A measurement is a number with its standard uncertainty and all that it belongs to: what was
-measured, by which engine, with which parameters, under which named conditions, in which runs.
-Labels and sentences are made from it and never read back. A file holds the measurements of one
+Labels and sentences are made from measurements and never read back. A file holds those of one
 protocol as columns, one row a measurement: it opens with ``xarray.open_dataset(path,
 engine="h5netcdf").to_dataframe()``."""
 
@@ -36,7 +34,7 @@ ANEW = "remove it, and 'dualball validate' measures anew"
 
 @dataclass(frozen=True, kw_only=True)
 class Measurement:
-    """One measured number."""
+    """One measured number, and all that it belongs to."""
 
     protocol: str
     """The name of the `compare.method.protocol.Protocol` that measured it."""
@@ -323,22 +321,23 @@ def load(path: Path, **origin: Any) -> Records:
         parameters = functools.cache(
             lambda *values: Parameters(**dict(zip(_PARAMETERS, values, strict=True)))
         )
-        conditions = {n[3:]: values for n, values in columns.items() if n.startswith("at_")}
-        causes = {n[2:]: values for n, values in columns.items() if n.startswith("u_")}
-        rows = []
-        for k in range(len(columns["value"])):
-            at = {name: values[k] for name, values in conditions.items()}
-            budget = {cause: values[k] for cause, values in causes.items()}
-            row = Measurement(
-                **{name: columns[name][k] for name in _OWN if name != "unit"},
-                runs=tuple(columns["runs"][k].split()),
-                budget={cause: u for cause, u in budget.items() if u == u},
-                parameters=parameters(*(columns[name][k] for name in _PARAMETERS)),
-                at=cast(Conditions, {n: v for n, v in at.items() if v != "" and v == v}),
+        conditions, causes = ([n for n in columns if n.startswith(of)] for of in ("at_", "u_"))
+        measurements = []
+        for values in zip(*columns.values(), strict=True):
+            row = dict(zip(columns, values, strict=True))
+            # what a row doesn't have is nan, or empty
+            held = {name: value for name, value in row.items() if value == value and value != ""}
+            m = Measurement(
+                **{name: row[name] for name in _OWN if name != "unit"},
+                runs=tuple(row["runs"].split()),
+                budget={n.removeprefix("u_"): held[n] for n in causes if n in held},
+                parameters=parameters(*(row[name] for name in _PARAMETERS)),
+                at=cast(
+                    Conditions, {n.removeprefix("at_"): held[n] for n in conditions if n in held}
+                ),
             )
-            rows.append(row)
-        planned = Counter[Planned]()
-        for protocol, of, name, count in json.loads(file.attrs["planned"]):
-            planned[Planned(protocol, of, name)] = count
+            measurements.append(m)
+        planned = json.loads(file.attrs["planned"])
         missing = (Missing(**each) for each in json.loads(file.attrs["missing"]))
-        return Records(tuple(rows), tuple(missing), planned)
+        counts = Counter({Planned(*what): count for *what, count in planned})
+        return Records(tuple(measurements), tuple(missing), counts)

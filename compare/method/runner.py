@@ -1,5 +1,4 @@
-"""What a protocol works with: an engine, a campaign of runs, and how much is measured; and what it
-hands in."""
+"""What a protocol works with: an engine, a campaign of runs, and how much is measured."""
 
 from __future__ import annotations
 

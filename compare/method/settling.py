@@ -57,7 +57,7 @@ ERROR_GROUPS = (
 
 @dataclass(frozen=True, eq=False)
 class SteadyState:
-    """Where a run has come to; `failure` says why it doesn't count as settled, empty if it does."""
+    """Where a run has come to."""
 
     start: Start
     case: Case
@@ -68,6 +68,7 @@ class SteadyState:
     excess: float = math.inf
     """Drift or swing divided by its limit for a comparison with theory."""
     failure: str = ""
+    """Why it doesn't count as settled."""
 
     def settled_in(self, *cases: Case) -> bool:
         """Whether it counts as settled, in one of these cases."""
@@ -136,7 +137,7 @@ def settle_groups(
     groups: Sequence[Sequence[Start]],
     criteria: SettlingCriteria = SettlingCriteria(),
 ) -> list[list[SteadyState]]:
-    """Settle groups of starts as `settle` does, all of them together."""
+    """Settle groups of starts, all of them together."""
     states = iter(settle(runner, [start for group in groups for start in group], criteria))
     return [[next(states) for _ in group] for group in groups]
 
@@ -225,14 +226,14 @@ def with_changes(
     value: Estimate, change: float, p: Parameters, size: float, divisor: float
 ) -> Estimate:
     """A value of a settled state, of which half the step and other starts change so much; `size` is
-    its natural size, and it has so many time steps in a coarse one.
+    its natural size, and it has `divisor` time steps in a coarse one.
 
     An error of first order in the step is what half of it changes; errors of solving for forces,
-    which add up with one sign from step to step for a time 1/c, are twice as much with half the
-    step, and so minus twice the change. Between the two anything is as likely: in the mean its
-    square is that of the change. What adds up at random the change may not show. Both take the
-    place of what `judge_run` allows for them. (The second was added after a round played blind,
-    where two claims were refuted without it.)"""
+    which add up with one sign for a time 1/c, are twice as much with half the step, and so minus
+    twice the change. Between the two anything is as likely: in the mean its square is that of the
+    change. What adds up at random the change may not show. Both take the place of what `judge_run`
+    allows for them. (The second was added after a round played blind, where two claims were refuted
+    without it.)"""
     if divisor == 1:
         return value.also(start=change)
     return estimate(
@@ -282,7 +283,7 @@ def rounded_duration(p: Parameters, units: float) -> float:
 
 
 def initial_condition(set: str, p: Parameters, how: str) -> Start:
-    """A start at the flow of p: from rest, with the fluid, half as fast, or up the wall."""
+    """A start at the flow of p: from rest, with the fluid, half as fast, or on the wall."""
     orbit = {"rest": 0.0, "half as fast": p.omega_0 / 2}.get(how, p.omega_0)
     height = safe_height(p) if how == "on the wall" else 0.0
     return Start(set, p, how, State(y=height, omega_c=orbit).stacked())
@@ -305,7 +306,7 @@ def physical_case(case: Case) -> Case:
 
 
 def is_well_known(omega_c: Measurement) -> bool:
-    """Whether a settled state is known well enough for others to be measured from it."""
+    """Whether others can be measured from a settled state."""
     return omega_c.uncertainty <= STATE_KNOWN * rotation_scale(omega_c.parameters)
 
 

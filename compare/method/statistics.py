@@ -1,7 +1,5 @@
-"""Numbers with uncertainties: window means and peaks of sampled runs, curves through points;
-numbers as JSON has them.
-
-Of curves: values, slopes, zeros and maxima of polynomials, and exponents of linear motions."""
+"""Numbers with uncertainties: window means and peaks of sampled runs; zeros, slopes and maxima of
+curves through points; exponents of linear motions; numbers as JSON has them."""
 
 from __future__ import annotations
 

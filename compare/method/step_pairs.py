@@ -1,7 +1,5 @@
-"""Motions with one time step and with shorter ones, whose differences show the error.
-
-Trials, of any length; and records of a few steps: polynomials through one give values and rates of
-change, whose uncertainty is what the step and the degree change."""
+"""Motions with one time step and with shorter ones, whose differences show the error; polynomials
+through records of a few steps, which give values and rates of change."""
 
 from __future__ import annotations
 
@@ -38,8 +36,7 @@ class Start:
 class StepPair(Start):
     """A motion that is run with two time steps, or with three; or with one, for no error."""
 
-    t_end: float
-    """s"""
+    t_end: float  # s
     divisors: tuple[int, ...]
     """Time steps in one of `coarse_step`, the fewest first."""
     samples: int | None = None
@@ -197,10 +194,8 @@ def lag_error(runner: Runner, p: Parameters, divisor: int = 1) -> float:
 def polynomials(
     time: Array, values: Array, degrees: tuple[int, int], at: float = 0.0
 ) -> tuple[Array, Array]:
-    """Values and slopes at a time, each (2, ...), of polynomials of two degrees through values (n,
-    ...).
-
-    By least squares."""
+    """Values and slopes at a time, each (2, ...), of polynomials of two degrees through values
+    (n, ...) in least squares."""
     unit = float(np.ptp(time)) / 2
     powers = [np.vander((time - at) / unit, degree + 1, increasing=True) for degree in degrees]
     fits = [np.linalg.lstsq(each, values, rcond=None)[0] for each in powers]
