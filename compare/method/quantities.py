@@ -1,5 +1,5 @@
-"""What is measured: every quantity with its symbol, unit, and the resolution that is
-required of a check of it.
+"""What is measured: every quantity with its symbol, unit, and the resolution that is required of a
+check of it.
 
 A check has the resolution r if it would notice a prediction that is off by r times the quantity's
 scale, see `claim.Criterion`. A check with less than `Quantity.resolution` is inconclusive, however
@@ -8,8 +8,7 @@ level:
 
 * settled states don't depend on the time step: what is left is their drift, which is waited for
   down to 1e-8. A slip is a difference of spins ten times its size, a force one of accelerations;
-* a threshold is bracketed, or extrapolated from settled states as near to it as their settling
-  allows;
+* a threshold is bracketed, or extrapolated from settled states as near as their settling allows;
 * on the edge between two attractors the oscillation has died out to 1e-4 of the spin, three times
   which is to be resolved; a ball that is pushed leaves the floor within a time step, seen from its
   height of tenths of a millimetre;
@@ -25,11 +24,9 @@ level:
   of the relative change of eta: known to 4e-3, it gives the eta at which it is 1 to 8e-3, three
   times which is to be resolved;
 * motions to their ends are compared at two time steps, to a thousandth of what gravity does in the
-  unit of time;
-* pulsations and jumps are compared at two time steps, to a thousandth. The onset of slip is
-  bracketed to that, and slip begins within a time step, a few hundredths of a period, near a
-  maximum; the mean reading and the flow by which a ramp passes a fold are small differences of
-  flows;
+  unit of time; pulsations and jumps to a thousandth, to which the onset of slip is bracketed. Slip
+  begins within a time step, a few hundredths of a period, near a maximum; the mean reading and the
+  flow by which a ramp passes a fold are small differences of flows;
 * a contact rolls once friction can stop its slip within a step: at g h, 1/160 of sqrt(g R) at
   quick;
 * rates and growths come from short records and carry the error of a time step, a few tenths of a
@@ -61,8 +58,7 @@ class Quantity:
 
     name: str
     symbol: str
-    unit: str
-    """SI, as in the HDF5 files."""
+    unit: str  # SI
     resolution: float
     """Largest relative error of a prediction that a check may overlook."""
     scale: Scale | None = None
@@ -88,17 +84,16 @@ def _one(p: Parameters) -> float:
     return 1.0
 
 
-_TURNS: dict[str, tuple[str, Scale]] = {
-    "omega_c": ("ω_c", rotation_scale),
-    "slip_x": ("ω̃_x", slip_scale),
-    "slip_y": ("ω̃_y", slip_scale),
-    "slip_z": ("ω̃_z", slip_scale),
-}
-_WALL_SPIN: dict[str, tuple[str, Scale]] = {"wall_spin": ("ω_x⁰", slip_scale)}
+_SLIPS = {"slip_x": "ω̃_x", "slip_y": "ω̃_y", "slip_z": "ω̃_z"}
+_TURNS: tuple[tuple[str, str, Scale], ...] = (
+    ("omega_c", "ω_c", rotation_scale),
+    *((name, symbol, slip_scale) for name, symbol in (_SLIPS | {"wall_spin": "ω_x⁰"}).items()),
+)
+"""Rates of rotation: name, symbol, and scale."""
 _RATES: tuple[tuple[str, str, str, Scale], ...] = (
     *((name, name, "m s-1", lambda p: p.g) for name in ("v_y", "v_h")),
     ("omega_c", "ω_c", "rad s-1", lambda p: p.g / p.R),
-    *((n, s, "rad s-1", lambda p: p.g / p.r) for n, (s, _) in _TURNS.items() if n != "omega_c"),
+    *((name, symbol, "rad s-1", lambda p: p.g / p.r) for name, symbol in _SLIPS.items()),
 )
 """Variables with a rate of change: name, symbol, unit, and the scale of the rate."""
 _FORCES = {f"{contact}{axis}": f"{contact}_{axis}" for contact in "AB" for axis in "xyz"}
@@ -109,7 +104,7 @@ _ALL = (
     Quantity("cases", "cases reached", "1", 0.0),
     *(
         Quantity(n, symbol, "rad s-1", 1e-7 if n == "omega_c" else 1e-6, scale, of=n)
-        for n, (symbol, scale) in (_TURNS | _WALL_SPIN).items()
+        for n, symbol, scale in _TURNS
     ),
     Quantity("v_y", "v_y", "m s-1", 1e-6, dragged_speed, of="v_y"),
     Quantity("y", "y", "m", 1e-2, of="y"),
@@ -144,7 +139,7 @@ _ALL = (
     ),
     *(
         Quantity(f"edge_{n}", f"{symbol} on the edge", "rad s-1", 1e-3, scale, of=n)
-        for n, (symbol, scale) in (_TURNS | _WALL_SPIN).items()
+        for n, symbol, scale in _TURNS
     ),
     Quantity("lifts", "leaves the floor", "1", 0.0),
     Quantity("lift_onset", "ω_c at A_y = 0", "rad s-1", 2e-2),

@@ -235,12 +235,12 @@ def series_by_step(
         if (last := finest[protocol]) not in by_divisor:
             continue
         ones = by_divisor.pop(last)
-        coarser: list[list[tuple[int, Check]]] = [[] for _ in ones]
+        series = [{last: own} for own in ones]
         for divisor, others in by_divisor.items():
             for i, k in _pair_nearest(ones, others):
-                coarser[i].append((divisor, others[k]))
-        for own, before in zip(ones, coarser, strict=True):
-            divisors, checks = zip(*before, (last, own), strict=True)
+                series[i][divisor] = others[k]
+        for each in series:
+            divisors, checks = zip(*sorted(each.items()), strict=True)
             yield StepSeries(divisors, checks)
 
 
