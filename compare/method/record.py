@@ -326,15 +326,14 @@ def load(path: Path, **origin: Any) -> Records:
         for values in zip(*columns.values(), strict=True):
             row = dict(zip(columns, values, strict=True))
             # what a row doesn't have is nan, or empty
-            held = {name: value for name, value in row.items() if value == value and value != ""}
+            kept = {name: value for name, value in row.items() if value == value and value != ""}
+            at = {n.removeprefix("at_"): kept[n] for n in conditions if n in kept}
             m = Measurement(
                 **{name: row[name] for name in _OWN if name != "unit"},
                 runs=tuple(row["runs"].split()),
-                budget={n.removeprefix("u_"): held[n] for n in causes if n in held},
+                budget={n.removeprefix("u_"): kept[n] for n in causes if n in kept},
                 parameters=parameters(*(row[name] for name in _PARAMETERS)),
-                at=cast(
-                    Conditions, {n.removeprefix("at_"): held[n] for n in conditions if n in held}
-                ),
+                at=cast(Conditions, at),
             )
             measurements.append(m)
         planned = json.loads(file.attrs["planned"])
