@@ -129,6 +129,9 @@ def plan(
     engine: Engine | None,
 ) -> Study:
     """Check what is asked for, see `validate`, and open the directory of the results."""
+    check_type("level", level, Level)
+    check_type("sets", sets, Mapping | None)
+    check_type("engine", engine, Engine | None)
     for p in (sets or {}).values():
         check_type("sets", p, Parameters)
     if engine:

@@ -45,6 +45,8 @@ RUNS_A_THREAD = 16
 """Fewest runs for which a thread is worth its while: with fewer, threads wait for one another's
 Python."""
 MOST_THREADS = 1024
+MOST_STEPS = 1e15
+"""Of a run: so many can be counted."""
 
 
 class Run:
@@ -190,6 +192,8 @@ def check_timestep(timestep: float, p: Parameters, flow: Flow, t_end: float, x0:
 def sampling(t_end: float, timestep: float, sample_interval: float | None) -> tuple[int, int]:
     """Steps between samples and number of samples, both ends included."""
     t_end = check_number("t_end", t_end, "s", Range(timestep), "to hold a time step it")
+    longest, meaning = Range(high=MOST_STEPS * timestep), f"for at most {MOST_STEPS:g} steps it"
+    check_number("t_end", t_end, "s", longest, meaning)
     if sample_interval is None:
         sample_interval = max(t_end / 1000, timestep)
     least = Range(timestep * (1 - 1e-9))

@@ -112,14 +112,16 @@ class Flow:
     def sines(cls, mean: float, waves: Iterable[tuple[float, float, float]]) -> Self:
         """The sum of a mean and waves (amplitude, frequency, phase) as in `sine`."""
         flow = cls._from_pieces("sines", [0.0], [mean], [0.0])
-        frequencies = Range(0.0, REACH.high, open=True)
+        frequencies, given = Range(0.0, REACH.high, open=True), list(waves)
+        if any(np.shape(wave) != (3,) for wave in given):
+            raise InputError("each wave needs an amplitude, a frequency and a phase")
         rows = [
             (
                 check_number(f"amplitude of wave {k}", amplitude, "rad s-1", REACH),
                 check_number(f"frequency of wave {k}", frequency, "Hz", frequencies),
                 check_number(f"phase of wave {k}", phase, "rad"),
             )
-            for k, (amplitude, frequency, phase) in enumerate(waves)
+            for k, (amplitude, frequency, phase) in enumerate(given)
         ]
         return replace(flow, waves=np.array(rows).reshape(-1, 3))
 

@@ -59,9 +59,9 @@ class State(NamedTuple):
     @classmethod
     def one(cls, x: npt.ArrayLike) -> State:
         """A single state, checked, as floats; raises `InputError` for more than one."""
-        if np.ndim(x) > 1:
+        if (state := full_state(x)).ndim > 1:
             raise InputError(f"one state is needed, not an array of shape {np.shape(x)}")
-        return cls(*full_state(x).tolist())
+        return cls(*state.tolist())
 
     def stacked(self) -> Array:
         """The states as one array (..., 8); inverse of `of`."""
@@ -122,8 +122,9 @@ def full_state(x: npt.ArrayLike) -> Array:
         six = f"6 entries ({', '.join(VARIABLES[:6])})"
         raise InputError(f"a state has {six} or 8 (with h, v_h), not {state.shape}")
     if not np.all(np.isfinite(state)):
-        k = int(np.argwhere(~np.isfinite(state))[0][-1])
-        raise InputError(f"{VARIABLES[k]} = {state[..., k]} {UNITS[k]} must be finite")
+        place = tuple(np.argwhere(~np.isfinite(state))[0])
+        k = int(place[-1])
+        raise InputError(f"{VARIABLES[k]} = {state[place]} {UNITS[k]} must be finite")
     if state.shape[-1] == 6:
         state = np.concatenate([state, np.zeros((*state.shape[:-1], 2))], axis=-1)
     return state

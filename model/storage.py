@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from model.cases import Case
-from model.errors import StorageError
+from model.errors import StorageError, check_type
 from model.flow import Flow
 from model.hdf5 import dataset, reading, writing
 from model.parameters import Parameters
@@ -48,6 +48,7 @@ _PACKED = {"compression": "gzip", "shuffle": True}
 
 def save(run: Trajectory, path: str | Path) -> None:
     """Write a run; raises `StorageError` if that can't be done, leaving nothing behind."""
+    check_type("run", run, Trajectory)
     with writing(path) as file:
         write(run, file)
 

@@ -17,7 +17,7 @@ from analytic.stationary.slipping_branch import hopf_places
 from compare.testing import assert_settles, read
 from mjsim import ContactSettings, RigidContacts
 from mjsim import simulate_many as many
-from model import Case, Flow, InputError, Parameters, State
+from model import Case, Flow, InputError, Parameters, State, storage
 from model.drag import LAWS
 from model.kinematics import full_state
 
@@ -72,6 +72,12 @@ REFUSED = [
         lambda: Flow.steady("fast"),
         "^omega_0 of flow sample 0 = 'fast' must be a number in rad s-1$",
     ),
+    (lambda: compare.validate("no", level="quick"), "^level must be Level, not str$"),
+    (lambda: compare.validate("no", engine="mujoco"), "^engine must be Engine, not str$"),
+    (lambda: compare.validate("no", sets=[P]), "^sets must be Mapping, not list$"),
+    (lambda: storage.save("run", "no.h5"), "^run must be Trajectory, not str$"),
+    (lambda: moves(x0=[[1], [2, 3]]), r"^a state must be numbers, not \[\[1\], \[2, 3\]\]$"),
+    (lambda: Flow.sines(1, [(1, 2)]), "^each wave needs an amplitude, a frequency and a phase$"),
     # out of range: model
     *((lambda law=law: P.replace(drag=law), f"^drag = '{law}' {NU_F}") for law in LAWS[1:]),
     (
@@ -176,6 +182,10 @@ REFUSED = [
     ),
     (lambda: moves(t_end=-1.0), "t_end = -1 s"),
     (lambda: moves(t_end=math.nan), "t_end"),
+    (lambda: moves(t_end=1e300), r"t_end = 1e\+300 s .* for at most 1e\+15 steps it must"),
+    (lambda: moves(settings=RigidContacts(timestep=0.5), sample_interval=0.01), "^timestep = 0.5"),
+    (lambda: analytic.attractors(P, 1, seed=-1), "^seed = -1 is out of range"),
+    (lambda: many([P], [[0, np.nan, 0, 0, 0, 0]], 1.0), "^v_y = nan m s-1 must be finite$"),
     (lambda: moves(sample_interval=1e-5), "sample_interval = 1e-05 s"),
     *((lambda n=n: many([P], [AT_REST], 0.1, threads=n), "^threads = ") for n in (*BAD, "2")),
     (lambda: many([P], [], 0.1), EVERY),

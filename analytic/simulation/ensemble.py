@@ -131,6 +131,7 @@ def random_starts(p: Parameters, count: int, seed: int = 0) -> Array:
     omega_c is up to twice omega_0 either way, slips up to what rolling at twice omega_0 is; all
     evenly spread."""
     check_number("starts", count, "runs", Range(1, whole=True))
+    check_number("seed", seed, "1", Range(0, whole=True))
     rng = np.random.default_rng(seed)
     size = 2 * abs(p.omega_0) * np.array([1.0, *[p.R / p.r] * 3])
     x = np.zeros((count, len(VARIABLES)))
