@@ -7,22 +7,23 @@ All take some ten minutes.
 from __future__ import annotations
 
 import copy
-import functools
 import itertools
 import math
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import mujoco
 import numpy as np
 
 from compare.figures.pages import Rows
+from docs.studies import ways
 from docs.studies.small_scenes import FLOOR, free
 from docs.studies.small_scenes import model as world
 from docs.studies.tables import write_all
-from docs.studies.ways import Plain, Stepper, processor_time
+from docs.studies.ways import Stepper, Way, processor_time
 from mjsim import Coulomb
 
 G = 9.81
@@ -34,18 +35,14 @@ SCENES = {
     "ball": "ball held by rolling friction",
     "cart": "cart with its wheels braked",
 }
-SOFT: dict[str, Any] = {"law": {}}
-RIGID: dict[str, Any] = {"law": {"rigid": True}}
-PLAIN: dict[str, Any] = {}
-WAYS: dict[str, dict[str, Any]] = {
-    "plain": PLAIN,
-    "impratio 100": {"impratio": 100},
-    "noslip": {"noslip_iterations": 10},
-    "soft": SOFT,
-    "rigid": RIGID,
-}
-"""Options of the model, and what is asked of `Coulomb`, if it is there."""
-CHOSEN, BODIES, SETTLING, LAST = 10, 18, 5.0, 1.0
+WAYS = {name: way for name, way in ways.WAYS.items() if way.timed}
+THREE = {name: WAYS[name] for name in ("plain", "soft", "rigid")}
+PLAIN, SOFT, RIGID = THREE.values()
+BOX, BALL = 'type="box" size=".05 .05 .05" mass="1"', 'type="sphere" size=".05" mass="1"'
+FLAT = 'type="box" size=".1 .1 .05" mass="1"'
+LONG = "heap of 216", "at rest, 1000"
+"""Scenes that are measured with soft contacts only: others take half an hour."""
+PILES, BODIES, SETTLING, LAST = 10, 18, 5.0, 1.0
 STILL, RISE = 1e-9, 1e-9
 """Most that a body at rest moves in the last second, m; and that energy rises, J."""
 
@@ -58,20 +55,9 @@ class Installed(Coulomb):
             mujoco.mj_step(self.model, data, nstep)
 
 
-def start(
-    model: Any, law: dict[str, Any] | None = None, door: Any = Coulomb, **options: Any
-) -> tuple[Any, Stepper]:
-    """Data of a model with other options, and what steps them; a law's own numbers go by their
-    names in `Law`."""
-    for name, value in options.items():
-        setattr(model.opt, name, value)
-    if law is None:
-        return mujoco.MjData(model), Plain(model)
-    offered = {
-        name: value for name, value in law.items() if name in ("rigid", "restitution", "servo")
-    }
-    stepper = door(model, **offered)
-    stepper._law = replace(stepper._law, **{k: law[k] for k in law.keys() - offered.keys()})
+def start(model: Any, way: Way) -> tuple[Any, Stepper]:
+    """Data of a model, and what steps them."""
+    stepper = way.begin(model)
     return mujoco.MjData(model), stepper
 
 
@@ -83,15 +69,12 @@ def one(
     return world(FLOOR + free("body", f"0 0 {height}", geom), option, slope=slope, mu=mu)
 
 
-LONG = "heap of 216", "at rest, 1000"
-"""Scenes that are measured with soft contacts only: others take half an hour."""
-BOX, BALL = 'type="box" size=".05 .05 .05" mass="1"', 'type="sphere" size=".05" mass="1"'
-FLAT = 'type="box" size=".1 .1 .05" mass="1"'
+# -- what holds ------------------------------------------------------------------------------------
 
 
-def creep(scene: str, way: dict[str, Any]) -> float:
-    """How far a body of a scene goes in a second once it has settled, m s-1."""
-    return crept(*start(mujoco.MjModel.from_xml_path(f"docs/friction/{scene}.xml"), **way))
+def of_page(scene: str) -> Any:
+    """The model of a scene."""
+    return mujoco.MjModel.from_xml_path(f"docs/friction/{scene}.xml")
 
 
 def crept(data: Any, stepper: Stepper) -> float:
@@ -102,13 +85,12 @@ def crept(data: Any, stepper: Stepper) -> float:
     return float(np.abs(data.xpos - place).max())
 
 
-def breakaway(way: dict[str, Any]) -> float:
+def breakaway(way: Way) -> float:
     """Force that starts to move a box, faster than 1e-5 m/s, in units of mu N; it grows for 11
     s."""
-    data, stepper = start(one(BOX), **way)
+    data, stepper = start(one(BOX), way)
     stepper.step(data, 500)
-    shares = np.linspace(0, 1.1, 5500)
-    for share in shares:
+    for share in np.linspace(0, 1.1, 5500):
         data.qfrc_applied[0] = share * 0.6 * G
         stepper.step(data)
         if data.qvel[0] > 1e-5:
@@ -116,15 +98,30 @@ def breakaway(way: dict[str, Any]) -> float:
     return math.inf
 
 
-def shaken(way: dict[str, Any]) -> float:
+def shaken(way: Way) -> float:
     """How far a box on a slope of 10° goes in 8 s, shaken along it by 2 N at 40 rad/s, m."""
-    data, stepper = start(one(BOX, slope=10), **way)
+    data, stepper = start(one(BOX, slope=10), way)
     stepper.step(data, 500)
     place = data.qpos[0]
     for _ in range(4000):
         data.qfrc_applied[0] = 2 * math.sin(40 * data.time)
         stepper.step(data)
     return float(abs(data.qpos[0] - place))
+
+
+def holding() -> Rows:
+    """Creep in the scenes, breakaway, and drift of a shaken box, one row each, for each way."""
+    rows = [["", *WAYS]]
+    for scene, name in SCENES.items():
+        creep = (f"{crept(*start(of_page(scene), way)):.1e}" for way in WAYS.values())
+        rows.append([f"{name} (`{scene}.xml`): creep, m/s", *creep])
+    pulled = "box that is pulled: breaks away at, share of Coulomb's limit"
+    rows.append([pulled, *(f"{breakaway(way):.4f}" for way in WAYS.values())])
+    drifts = "box shaken on a slope of 10°: drift in 8 s, m"
+    return [*rows, [drifts, *(f"{shaken(way):.1e}" for way in WAYS.values())]]
+
+
+# -- what a step costs -----------------------------------------------------------------------------
 
 
 def columns(count: int) -> Any:
@@ -140,7 +137,8 @@ def columns(count: int) -> Any:
 
 
 def heap(count: int) -> Any:
-    """Boxes that fall on a floor in layers of nine, each turned a little."""
+    """Boxes that fall on a floor in layers of nine, each turned a little: 30 contacts of 8 boxes to
+    270 of 64."""
     rng, bodies = np.random.default_rng(count), ""
     for k in range(count):
         place = f"{0.13 * (k % 3 - 1)} {0.13 * (k // 3 % 3 - 1)} {0.1 + 0.15 * (k // 9)}"
@@ -150,18 +148,18 @@ def heap(count: int) -> Any:
 
 
 def cost(
-    model: Any, way: dict[str, Any], begin: Callable[[Any, Stepper], None], rounds: int, steps: int
+    model: Any, way: Way, begin: Callable[[Any, Stepper], None], rounds: int, steps: int
 ) -> float:
     """Processor time of a step, plain MuJoCo's being 1: median of runs in turn."""
-    runs, times = [start(copy.copy(model), **each) for each in (PLAIN, way)], np.empty((rounds, 2))
+    runs, times = [start(copy.copy(model), each) for each in (PLAIN, way)], np.empty((rounds, 2))
     for row in times:
         for k, (data, stepper) in enumerate(runs):
             begin(data, stepper)
-            row[k] = processor_time(functools.partial(stepper.step, data, steps))
+            row[k] = processor_time(partial(stepper.step, data, steps))
     return float(np.median(times[:, 1] / times[:, 0]))
 
 
-def at_rest(count: int, way: dict[str, Any]) -> float:
+def at_rest(count: int, way: Way) -> float:
     """Cost of a step at rest with so many contacts, to which each comes by itself."""
 
     def begin(data: Any, stepper: Stepper) -> None:
@@ -171,7 +169,7 @@ def at_rest(count: int, way: dict[str, Any]) -> float:
     return cost(columns(count), way, begin, 15, max(3000 // count, 40))
 
 
-def moving(model: Any, way: dict[str, Any], rounds: int, steps: int, speed: float = 0.0) -> float:
+def moving(model: Any, rounds: int, steps: int, speed: float, way: Way) -> float:
     """Cost of a step from the beginning, where the first body may have a speed."""
 
     def begin(data: Any, stepper: Stepper) -> None:
@@ -182,63 +180,30 @@ def moving(model: Any, way: dict[str, Any], rounds: int, steps: int, speed: floa
     return cost(model, way, begin, rounds, steps)
 
 
-def falling(count: int, rounds: int, way: dict[str, Any]) -> float:
-    """Cost of a step of a heap, 30 contacts of 8 boxes to 270 of 64."""
-    return moving(heap(count), way, rounds, 600)
-
-
 def costs() -> Rows:
     """What a step costs, in units of plain MuJoCo's."""
-    ways = {"soft": SOFT, "soft, installed": SOFT | {"door": Installed}, "rigid": RIGID}
-    scenes: dict[str, Callable[[dict[str, Any]], float]] = {
-        **{
-            f"at rest, {count} contacts": functools.partial(at_rest, count)
-            for count in (1, 12, 52, 200, 1000)
-        },
-        "a box that slides": lambda way: moving(one(BOX, 0.25, 20), way, 15, 500, speed=1.0),
-        **{
-            f"heap of {count} boxes that falls, 1.2 s": functools.partial(falling, count, 1)
-            for count in (8, 27, 64, 216)
-        },
+    doors = {"soft": SOFT, "soft, installed": Way(Installed), "rigid": RIGID}
+    scenes: dict[str, Callable[[Way], float]] = {
+        f"at rest, {n} contacts": partial(at_rest, n) for n in (1, 12, 52, 200, 1000)
     }
-    rows = [["cost of a step", *ways]]
+    scenes["a box that slides"] = partial(moving, one(BOX, 0.25, 20), 15, 500, 1.0)
+    for n in (8, 27, 64, 216):
+        scenes[f"heap of {n} boxes that falls, 1.2 s"] = partial(moving, heap(n), 1, 600, 0.0)
+    rows = [["cost of a step", *doors]]
     for name, measure in scenes.items():
-        found = [
-            f"{measure(way):.2f}" if not name.startswith(LONG) or way is SOFT else "–"
-            for way in ways.values()
-        ]
+        ways_of_it = [SOFT] if name.startswith(LONG) else doors.values()
+        found = (f"{measure(way):.2f}" if way in ways_of_it else "–" for way in doors.values())
         rows.append([name, *found])
     return rows
 
 
-def holding() -> Rows:
-    """Creep in the scenes, breakaway, and drift of a shaken box, one row each, for each way."""
-    return [
-        ["", *WAYS],
-        *(
-            [
-                f"{name} (`{scene}.xml`): creep, m/s",
-                *(f"{creep(scene, way):.1e}" for way in WAYS.values()),
-            ]
-            for scene, name in SCENES.items()
-        ),
-        [
-            "box that is pulled: breaks away at, share of Coulomb's limit",
-            *(f"{breakaway(way):.4f}" for way in WAYS.values()),
-        ],
-        [
-            "box shaken on a slope of 10°: drift in 8 s, m",
-            *(f"{shaken(way):.1e}" for way in WAYS.values()),
-        ],
-    ]
+# -- what slides or rolls, in closed form ----------------------------------------------------------
 
 
-def slide_down(
-    step: float, way: dict[str, Any], geom: str = BOX, mu: float = 0.25
-) -> tuple[float, float]:
+def slide_down(step: float, way: Way, geom: str = BOX, mu: float = 0.25) -> tuple[float, float]:
     """A body that slides down 20°: error of its acceleration, at most; share of steps without
     contact."""
-    data, stepper = start(one(geom, mu, 20, step=step), **way)
+    data, stepper = start(one(geom, mu, 20, step=step), way)
     stepper.step(data, round(1.5 / step))
     speeds, lost = [data.qvel[0]], 0
     for _ in range(round(0.5 / step)):
@@ -249,12 +214,10 @@ def slide_down(
     return float(np.abs(np.diff(speeds) / step / exact - 1).max()), lost * step / 0.5
 
 
-def pushed_off(
-    step: float, way: dict[str, Any], mu: float = 0.4, speed: float = 2.0
-) -> tuple[float, float]:
+def pushed_off(step: float, way: Way, mu: float = 0.4, speed: float = 2.0) -> tuple[float, float]:
     """A box on the floor that gets a speed: by how much its height varies, m; its way, relative to
     the exact one."""
-    data, stepper = start(one(FLAT, mu, step=step), **way)
+    data, stepper = start(one(FLAT, mu, step=step), way)
     stepper.step(data, round(1 / step))
     data.qvel[0], begin, heights = speed, data.qpos[0], []
     for _ in range(round(1.2 * speed / (mu * G * step))):
@@ -264,7 +227,7 @@ def pushed_off(
 
 
 def precessing(
-    step: float, way: dict[str, Any], leans: float = 20.0, lasts: float = 2.0
+    step: float, way: Way, leans: float = 20.0, lasts: float = 2.0
 ) -> tuple[float, float]:
     """Euler's disc, a thin one that rolls round on its rim while its centre rests: what its energy
     changes by, relative, and by how many degrees it leans more. (Moffatt, Nature 404, 2000, has its
@@ -272,7 +235,7 @@ def precessing(
     angle, radius, thick = math.radians(leans), 0.05, 3e-4
     lowest = radius * math.sin(angle) + thick * math.cos(angle)
     disc = f'type="cylinder" size="{radius} {thick}" mass=".2"'
-    data, stepper = start(model := one(disc, 1.0, height=lowest, step=step), **way)
+    data, stepper = start(model := one(disc, 1.0, height=lowest, step=step), way)
     data.qpos[[3, 5]] = math.cos(angle / 2), math.sin(angle / 2)
     data.qvel[3] = -math.sqrt(4 * G * math.sin(angle) / radius)
     energies = []
@@ -285,186 +248,68 @@ def precessing(
     return energies[1] / energies[0] - 1, now - leans
 
 
-def rolling(step: float, way: dict[str, Any]) -> tuple[float]:
+def rolling(step: float, way: Way) -> tuple[float]:
     """A ball that slides, then rolls: relative error of its speed, 5/7 of that it begins with."""
-    data, stepper = start(one(BALL, 0.3, step=step), **way)
+    data, stepper = start(one(BALL, 0.3, step=step), way)
     stepper.step(data, round(1 / step))
     data.qvel[0] = 1.0
     stepper.step(data, round(1 / step))
     return (float(data.qvel[0] * 7 / 5 - 1),)
 
 
-Shown = dict[str, Callable[..., str]]
-"""What is told of a motion, from all that is measured of it."""
-SLIDING: dict[Callable[[float, dict[str, Any]], tuple[float, ...]], Shown] = {
+SLIDING: dict[Callable[[float, Way], tuple[float, ...]], dict[str, str]] = {
     slide_down: {
-        "box that slides down 20°, μ 0.25: relative error of its acceleration": (
-            lambda error, lost: f"{error:.1e}"
-        ),
-        "its contact is lost in": lambda error, lost: f"{lost:.0%}",
+        "box that slides down 20°, μ 0.25: relative error of its acceleration": "{0:.1e}",
+        "its contact is lost in": "{1:.0%}",
     },
     pushed_off: {
-        "box pushed off with 2 m/s, μ 0.4: its height varies by, µm": (
-            lambda height, error: f"{1e6 * height:.2g}"
-        ),
-        "relative error of its way, v²/(2 μ g)": lambda height, error: f"{error:+.1e}",
+        "box pushed off with 2 m/s, μ 0.4: its height varies by, µm": "{0:.2g}",
+        "relative error of its way, v²/(2 μ g)": "{1:+.1e}",
     },
-    rolling: {
-        "ball that slides, then rolls with 5/7 v: relative error": lambda error: f"{error:+.1e}"
-    },
-    precessing: {
-        "Euler's disc at 20°: energy gained in 2 s": lambda gained, leans: f"{gained:+.1e}"
-    },
+    rolling: {"ball that slides, then rolls with 5/7 v: relative error": "{0:+.1e}"},
+    precessing: {"Euler's disc at 20°: energy gained in 2 s": "{0:+.1e}"},
 }
-"""Motions that have a closed form, by what measures them at a time step and in a way."""
+"""Motions that have a closed form, by what measures them at a time step and in a way; and what is
+told of all that is measured, lengths in µm."""
 
 
 def sliding() -> Rows:
     """Motions that slide or roll, with their closed forms."""
-    ways, rows = {"plain": PLAIN, "soft": SOFT, "rigid": RIGID}, list[list[str]]()
+    rows = [["", "step, ms", *THREE]]
     for measure, told in SLIDING.items():
-        found = {step: [measure(step, way) for way in ways.values()] for step in (2e-3, 1e-3)}
-        for name, show in told.items():
+        unit = 1e6 if measure is pushed_off else 1.0
+        found = {step: [measure(step, way) for way in THREE.values()] for step in (2e-3, 1e-3)}
+        for name, form in told.items():
             for step, values in found.items():
-                rows.append([name, f"{1e3 * step:g}", *(show(*each) for each in values)])
-    return [["", "step, ms", *ways], *rows]
+                cells = (form.format(unit * first, *rest) for first, *rest in values)
+                rows.append([name, f"{1e3 * step:g}", *cells])
+    return rows
 
 
 def landing() -> Rows:
     """A fall of 0.2 m: the depth, the fastest and the highest that a body comes up again."""
-    rows = [
-        ["falls 0.2 m, step 2 ms", "deepest, m", "comes up at, m/s", "comes up to, share of 0.2 m"]
-    ]
-    ways = {"plain": PLAIN, "soft": SOFT, "rigid": RIGID}
-    ways |= {
-        f"rigid, restitution {e:g}": {"law": {"rigid": True, "restitution": e}}
+    head = ["falls 0.2 m, step 2 ms", "deepest, m", "comes up at, m/s"]
+    rows = [[*head, "comes up to, share of 0.2 m"]]
+    bounce = {
+        f"rigid, restitution {e:g}": Way(partial(Coulomb, rigid=True, restitution=e))
         for e in (0.5, 0.9, 1.0)
     }
-    for (name, geom), (way, asked) in itertools.product(
-        {"box": BOX, "ball": BALL}.items(), ways.items()
-    ):
-        data, stepper = start(one(geom, height=0.25), **asked)
+    bodies = {"box": BOX, "ball": BALL}.items()
+    for (name, geom), (how, way) in itertools.product(bodies, (THREE | bounce).items()):
+        data, stepper = start(one(geom, height=0.25), way)
         heights, speeds = [0.2], [0.0]
         for _ in range(500):
             stepper.step(data)
             heights.append(data.qpos[2] - 0.05)
             speeds.append(data.qvel[2])
-        lowest = next(
-            k for k, height in enumerate(heights) if height < 0.02 and heights[k + 1] >= height
-        )
-        top = max(heights[lowest:])
-        rows.append(
-            [
-                f"{name}, {way}",
-                f"{max(-min(heights), 0):.1e}",
-                f"{max(speeds[lowest:]):.1e}",
-                f"{top / 0.2:.4f}",
-            ]
-        )
+        pairs = enumerate(itertools.pairwise(heights))
+        lowest = next(k for k, (now, then) in pairs if now < 0.02 and then >= now)
+        ups = f"{max(speeds[lowest:]):.1e}", f"{max(heights[lowest:]) / 0.2:.4f}"
+        rows.append([f"{name}, {how}", f"{max(-min(heights), 0):.1e}", *ups])
     return rows
 
 
-def choices() -> Rows:
-    """What the numbers of the law decide: how many steps are in doubt, and what gets worse."""
-
-    def tried(law: dict[str, Any]) -> list[str]:
-        solves, steps, rest, rise = 0, 0, 0, 0.0
-        for seed, mixed in itertools.product(range(CHOSEN), (False, True)):
-            data, stepper = start(pile(seed, mixed), law=law)
-            drift, risen = settle(data, stepper)
-            rest, rise = rest + (drift < STILL and not mixed), max(rise, risen)
-            (own,) = stepper._simulations.values()  # type: ignore[attr-defined]
-            solves, steps = solves + int(own.record["solves"][0]), steps + 3000
-        height = max(
-            pushed_off(4e-3, {"law": law}, mu, speed)[0]
-            for mu, speed in ((0.2, 2.0), (1.2, 2.0), (1.2, 5.0))
-        )
-        return [
-            f"{solves / steps:.2f}",
-            f"{rest} of {CHOSEN}",
-            f"{rise:.1e}",
-            f"{1e6 * height:.2g}",
-        ]
-
-    laws: dict[str, dict[str, Any]] = {
-        "**soft**: slip predicted to a twentieth of gravity": {},
-        "to a hundredth": {"share": 0.01},
-        "predicted, never solved for": {"most": 0},
-        "at most 5 solutions": {"most": 5},
-        "**rigid**: R = 1e-3": {"rigid": True},
-        "predicted to a hundredth": {"rigid": True, "share": 0.01},
-        "loses all its depth in a step": {"rigid": True, "push": 1.0},
-        "keeps none": {"rigid": True, "depth": 0.0},
-    }
-    return [
-        [
-            "rule",
-            "steps in doubt, share",
-            "piles of boxes at rest",
-            "energy rises by at most, J",
-            "height varies by, µm",
-        ],
-        *([name, *tried(law)] for name, law in laws.items()),
-    ]
-
-
-def servo() -> Rows:
-    """Depth and creep with Baumgarte stabilisation and without."""
-
-    def grasped(scene: str, servo: float | None) -> list[str]:
-        model = mujoco.MjModel.from_xml_path(f"docs/friction/{scene}.xml")
-        return settled(model, servo)
-
-    def settled(model: Any, servo: float | None) -> list[str]:
-        model.geom_margin[:] = 4e-3 if servo else 0.0
-        data = mujoco.MjData(model)
-        way = crept(data, Coulomb(model, servo=servo))
-        return [f"{np.abs(data.contact.dist).max():.1e}", f"{way:.1e}"]
-
-    def rolls(servo: float | None) -> list[str]:
-        model = one('size=".01" mass=".03"', slope=5)
-        model.geom_margin[:] = 4e-3 if servo else 0.0
-        model.qpos0[2] = 0.01
-        data, stepper = mujoco.MjData(model), Coulomb(model, servo=servo)
-        stepper.step(data, 500)
-        speed = data.qvel[0]
-        stepper.step(data, 500)
-        exact = 5 / 7 * G * math.sin(math.radians(5))
-        return [
-            f"{np.abs(data.contact.dist).max():.1e}",
-            f"{(data.qvel[0] - speed) / exact - 1:+.1e}",
-        ]
-
-    def dropped(servo: float | None) -> list[str]:
-        model = one(BOX.replace("mass", 'euler="10 20 0" mass'))
-        model.qpos0[2] = 0.2
-        return settled(model, servo)
-
-    def resting(servo: float | None) -> list[str]:
-        still = 0
-        for seed in range(10):
-            model = pile(seed, mixed=False)
-            model.geom_margin[:] = 4e-3 if servo else 0.0
-            still += settle(mujoco.MjData(model), Coulomb(model, servo=servo))[0] < STILL
-        return ["–", f"{still} of 10"]
-
-    scenes: dict[str, Callable[[float | None], list[str]]] = {
-        SCENES["stack"] + ": creep, m/s": functools.partial(grasped, "stack"),
-        SCENES["fingers"] + ": creep, m/s": functools.partial(grasped, "fingers"),
-        SCENES["grasp"] + ": creep, m/s": functools.partial(grasped, "grasp"),
-        "box dropped on an edge: creep, m/s": dropped,
-        "ball of 1 cm that rolls down 5°: acceleration, error": rolls,
-        "piles of 18 boxes: at rest": resting,
-    }
-    times = {"none": None, "0.1 s": 0.1, "0.02 s": 0.02}
-    head = [text for name in times for text in (f"{name}: depth, m", "")]
-    return [
-        ["scene", *head],
-        *(
-            [name, *(cell for time in times.values() for cell in measure(time))]
-            for name, measure in scenes.items()
-        ),
-    ]
+# -- what numbers of the law decide ----------------------------------------------------------------
 
 
 def pile(seed: int, mixed: bool) -> Any:
@@ -494,6 +339,91 @@ def settle(data: Any, stepper: Stepper) -> tuple[float, float]:
             lowest = min(lowest, energy)
             rise = max(rise, energy - lowest)
     return float(np.abs(data.xpos - place).max()), rise
+
+
+def numbers(rigid: bool = False, **law: Any) -> Way:
+    """The law with other numbers, by their names in `Law`."""
+
+    def stepper(model: Any) -> Coulomb:
+        coulomb = Coulomb(model, rigid=rigid)
+        coulomb._law = replace(coulomb._law, **law)
+        return coulomb
+
+    return Way(stepper)
+
+
+LAWS = {
+    "**soft**: slip predicted to a twentieth of gravity": numbers(),
+    "to a hundredth": numbers(share=0.01),
+    "predicted, never solved for": numbers(most=0),
+    "at most 5 solutions": numbers(most=5),
+    "**rigid**: R = 1e-3": numbers(rigid=True),
+    "predicted to a hundredth": numbers(rigid=True, share=0.01),
+    "loses all its depth in a step": numbers(rigid=True, push=1.0),
+    "keeps none": numbers(rigid=True, depth=0.0),
+}
+
+
+def choices() -> Rows:
+    """What the numbers of the law decide: how many steps are in doubt, and what gets worse."""
+    head = ["rule", "steps in doubt, share", "piles of boxes at rest"]
+    rows = [[*head, "energy rises by at most, J", "height varies by, µm"]]
+    for name, way in LAWS.items():
+        solves, steps, rest, rise = 0, 0, 0, 0.0
+        for seed, mixed in itertools.product(range(PILES), (False, True)):
+            data, stepper = start(pile(seed, mixed), way)
+            drift, risen = settle(data, stepper)
+            rest, rise = rest + (drift < STILL and not mixed), max(rise, risen)
+            (own,) = stepper._simulations.values()
+            solves, steps = solves + int(own.record["solves"][0]), steps + 3000
+        pushes = (0.2, 2.0), (1.2, 2.0), (1.2, 5.0)
+        height = max(pushed_off(4e-3, way, mu, speed)[0] for mu, speed in pushes)
+        found = f"{solves / steps:.2f}", f"{rest} of {PILES}", f"{rise:.1e}", f"{1e6 * height:.2g}"
+        rows.append([name, *found])
+    return rows
+
+
+def stabilised(model: Any, time: float | None) -> tuple[Any, Coulomb]:
+    """Data and the law, with Baumgarte stabilisation of a time constant, or none."""
+    model.geom_margin[:] = 4e-3 if time else 0.0
+    return mujoco.MjData(model), Coulomb(model, servo=time)
+
+
+def creeps(model: Any, time: float | None) -> list[str]:
+    """Depth and creep of what has settled."""
+    data, law = stabilised(model, time)
+    way = crept(data, law)
+    return [f"{np.abs(data.contact.dist).max():.1e}", f"{way:.1e}"]
+
+
+def rolls(model: Any, time: float | None) -> list[str]:
+    """Depth of a ball that rolls down 5°, and the relative error of its acceleration."""
+    data, law = stabilised(model, time)
+    law.step(data, 500)
+    speed = data.qvel[0]
+    law.step(data, 500)
+    error = (data.qvel[0] - speed) / (5 / 7 * G * math.sin(math.radians(5))) - 1
+    return [f"{np.abs(data.contact.dist).max():.1e}", f"{error:+.1e}"]
+
+
+def servo() -> Rows:
+    """Depth and creep with Baumgarte stabilisation and without."""
+    times = {"none": None, "0.1 s": 0.1, "0.02 s": 0.02}
+    tilted = one(f'{BOX} euler="10 20 0"', height=0.2)
+    kept = ("stack", "fingers", "grasp")
+    scenes = {f"{SCENES[name]}: creep, m/s": of_page(name) for name in kept}
+    scenes["box dropped on an edge: creep, m/s"] = tilted
+    ball = one('size=".01" mass=".03"', slope=5, height=0.01)
+    rolling_down = "ball of 1 cm that rolls down 5°: acceleration, error"
+    rows = [["scene", *(text for name in times for text in (f"{name}: depth, m", ""))]]
+    for name, model in scenes.items():
+        rows.append([name, *(cell for time in times.values() for cell in creeps(model, time))])
+    rows.append([rolling_down, *(cell for time in times.values() for cell in rolls(ball, time))])
+    resting = []
+    for time in times.values():
+        piles = (stabilised(pile(seed, mixed=False), time) for seed in range(PILES))
+        resting += ["–", f"{sum(settle(*each)[0] < STILL for each in piles)} of {PILES}"]
+    return [*rows, [f"piles of {BODIES} boxes: at rest", *resting]]
 
 
 TABLES: dict[str, Callable[[], Rows]] = {

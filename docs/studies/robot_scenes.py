@@ -14,6 +14,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from docs.studies.small_scenes import tilt
 from docs.studies.ways import CREEP, SLIP, Array, Found, Run, Way, worst
 
 HUMANOIDS = 22
@@ -24,15 +25,8 @@ def lift(way: Way) -> Found:
     lets it go."""
     import robosuite
 
-    env = robosuite.make(
-        "Lift",
-        robots="Panda",
-        has_renderer=False,
-        has_offscreen_renderer=False,
-        use_camera_obs=False,
-        horizon=10**6,
-        seed=0,
-    )
+    unseen = dict.fromkeys(("has_renderer", "has_offscreen_renderer", "use_camera_obs"), False)
+    env = robosuite.make("Lift", robots="Panda", **unseen, horizon=10**6, seed=0)
     env.reset()
     run = Run(way, env.sim.model._model, env.sim.data._data)
     data, hand, cube = run.data, "gripper0_right_eef", "cube_main"
@@ -50,6 +44,9 @@ def lift(way: Way) -> Found:
         at = run.model.site("gripper0_right_grip_site").id
         return lambda _: np.clip(10 * (place - data.site_xpos[at]), -speed, speed)
 
+    def shaken(time: float) -> tuple[float, float, float]:
+        return 0.0, math.copysign(1, math.sin(6 * math.pi * time)), 0.0
+
     def still(_: float) -> tuple[float, float, float]:
         return 0.0, 0.0, 0.0
 
@@ -64,22 +61,20 @@ def lift(way: Way) -> Found:
     act(1, still, 1)
     held, height = run.places(cube, of=hand), run.places(cube)[0, 2] - start[2]
     creep = float(np.abs(held - before).max())
-    act(2, lambda time: (0, math.copysign(1, math.sin(6 * math.pi * time)), 0), 1)
+    act(2, shaken, 1)
     act(1, still, 1)
     slip = float(np.abs(run.places(cube, of=hand) - held).max())
     act(3, towards(start, 0.3), 1)
     act(1, still, -1)
     act(2, towards(start + up), -1)
     placed = run.places(cube)[0, 2]
-    return run.found(
-        {CREEP: creep, SLIP: slip},
-        {"not lifted": height < 0.1, "not placed": abs(placed - start[2]) > 5e-3},
-    )
+    wrong = {"not lifted": height < 0.1, "not placed": abs(placed - start[2]) > 5e-3}
+    return run.found({CREEP: creep, SLIP: slip}, wrong)
 
 
-def _hand(way: Way, name: str) -> Found:
-    """Shadow hand of gymnasium-robotics, palm upwards, with an object; the worst of three
-    starts."""
+def hand(name: str, way: Way) -> Found:
+    """Shadow hand of gymnasium-robotics, palm upwards, with the object of an environment; the worst
+    of three starts."""
     return worst([_held(way, name, seed) for seed in (3, 4, 5)])
 
 
@@ -95,12 +90,8 @@ def _held(way: Way, name: str, seed: int) -> Found:
     run = Run(way, env.model, env.data)
     palm, wrist = "robot0:palm", run.model.actuator("robot0:A_WRJ0").id
     run.advance(3)
-    creep, before, begin = (
-        run.creep("object", of=palm),
-        run.places("object", of=palm),
-        run.data.time,
-    )
-    middle = run.data.ctrl[wrist]
+    creep = run.creep("object", of=palm)
+    before, begin, middle = run.places("object", of=palm), run.data.time, run.data.ctrl[wrist]
 
     def shake() -> None:
         run.data.ctrl[wrist] = middle + 0.1 * math.sin(6 * math.pi * (run.data.time - begin))
@@ -112,14 +103,7 @@ def _held(way: Way, name: str, seed: int) -> Found:
     return run.found({CREEP: creep, SLIP: slip}, {"dropped": run.places("object")[0, 2] < 0.1})
 
 
-def block(way: Way) -> Found:
-    """With the block."""
-    return _hand(way, "HandManipulateBlock-v1")
-
-
-def egg(way: Way) -> Found:
-    """With the egg."""
-    return _hand(way, "HandManipulateEgg-v1")
+block, egg = (functools.partial(hand, f"HandManipulate{name}-v1") for name in ("Block", "Egg"))
 
 
 def ant(way: Way) -> Found:
@@ -130,11 +114,7 @@ def ant(way: Way) -> Found:
     env: Any = gymnasium.make("Ant-v5").unwrapped
     env.reset(seed=0)
     env.model.opt.integrator = mujoco.mjtIntegrator.mjINT_EULER
-    env.model.opt.gravity[:] = (
-        9.81 * math.sin(math.radians(12)),
-        0,
-        -9.81 * math.cos(math.radians(12)),
-    )
+    tilt(env.model, 12)
     run = Run(way, env.model, env.data)
     run.advance(14)
     return run.found({CREEP: run.creep()})
@@ -146,7 +126,7 @@ def quadruped(way: Way) -> Found:
 
     physics = suite.load("quadruped", "walk", task_kwargs={"random": 0}).physics
     model = physics.model.ptr
-    model.opt.gravity[:] = 9.81 * math.sin(math.radians(10)), 0, -9.81 * math.cos(math.radians(10))
+    tilt(model, 10)
     run = Run(way, model)
     run.data.qpos[2] = 0.6
     run.advance(4)

@@ -13,7 +13,7 @@ import importlib.metadata
 import importlib.util
 import json
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -96,12 +96,12 @@ def figures(kept: Kept) -> Rows:
     rows = [["", *WAYS]]
     for title, _, ways in there(kept):
         for quantity in ways["plain"]["values"]:
-            cells = [
+            cells = (
                 ": ".join([f"{ways[way]['values'][quantity]:.1e}", *ways[way]["wrong"]])
                 if way in ways
                 else "–"
                 for way in WAYS
-            ]
+            )
             rows.append([f"{title}: {quantity}", *cells])
     return rows
 
@@ -137,17 +137,14 @@ def worse(kept: Kept) -> Rows:
 TABLES = {"figures": figures, "cost": cost, "worse": worse}
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main() -> int:
     """Measure all scenes whose package is there, or those named, and write the tables."""
-    parser = argparse.ArgumentParser(
-        description="Measure scenes that others wrote, and write their tables."
-    )
+    what = "Measure scenes that others wrote, and write their tables."
+    parser, only = argparse.ArgumentParser(description=what), "only this scene"
     parser.add_argument("page", type=Path, metavar="FILE", help="docs/records/scenes.md")
-    parser.add_argument(
-        "--only", action="append", choices=list(SCENES), metavar="NAME", help="only this scene"
-    )
+    parser.add_argument("--only", action="append", choices=[*SCENES], metavar="NAME", help=only)
     parser.add_argument("--kept", action="store_true", help="measure nothing, write what is kept")
-    args = parser.parse_args(argv)
+    args = parser.parse_args()
     file = args.page.with_suffix(".json")
     for name in [] if args.kept else args.only or SCENES:
         scene = SCENES[name]

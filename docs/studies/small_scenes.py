@@ -5,6 +5,7 @@ Each is a function of a `Way`, which steps it and returns what was `Found`.
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -29,13 +30,18 @@ def model(
     extra: str = "",
 ) -> Any:
     """A world on a slope, degrees, downwards along x."""
-    a = math.radians(slope)
-    return mujoco.MjModel.from_xml_string(
-        f'<mujoco><option cone="elliptic" gravity="{9.81 * math.sin(a)} 0 {-9.81 * math.cos(a)}" '
-        f"{option}>{extra}"
-        f"</option><default><geom "
-        f'friction="{mu}"/></default><worldbody>{body}</worldbody>{more}</mujoco>'
+    made = mujoco.MjModel.from_xml_string(
+        f'<mujoco><option cone="elliptic" {option}>{extra}</option><default><geom friction="{mu}"/>'
+        f"</default><worldbody>{body}</worldbody>{more}</mujoco>"
     )
+    tilt(made, slope)
+    return made
+
+
+def tilt(model: Any, slope: float) -> None:
+    """Let a world slope, degrees, downwards along x: it is gravity that is turned."""
+    a = math.radians(slope)
+    model.opt.gravity[:] = 9.81 * math.sin(a), 0, -9.81 * math.cos(a)
 
 
 def free(name: str, place: str, geom: str, **attributes: str) -> str:
@@ -51,14 +57,11 @@ def treadmill(way: Way) -> Found:
     """A box rides up a belt of 10°: by the velocity of its surface, or, where there is none, on a
     plate that moves."""
     surface = hasattr(mujoco.MjModel, "geom_surfacevel")
-    belt = 'type="box" size="3 .2 .05" pos="0 0 -.05"'
-    if surface:
-        world = f'<geom {belt} surfacevel="{-SPEED} 0 0 0 0 0"/>'
-    else:
-        world = (
-            f'<body gravcomp="1"><joint type="slide" axis="1 0 0"/><geom {belt} mass="1e6"/></body>'
-        )
-    run = Run(way, model(world + free("box", "0 0 .05", 'type="box" size=".05 .05 .05"'), slope=10))
+    belt, box = 'type="box" size="3 .2 .05" pos="0 0 -.05"', 'type="box" size=".05 .05 .05"'
+    moves, rides = '<joint type="slide" axis="1 0 0"/>', f'surfacevel="{-SPEED} 0 0 0 0 0"'
+    plate = f'<body gravcomp="1">{moves}<geom {belt} mass="1e6"/></body>'
+    world = f"<geom {belt} {rides}/>" if surface else plate
+    run = Run(way, model(world + free("box", "0 0 .05", box), slope=10))
     if not surface:
         run.data.qvel[0] = -SPEED
     run.advance(2)
@@ -115,41 +118,40 @@ def cradle(way: Way) -> Found:
 def nut(way: Way) -> Found:
     """A nut on a standing bolt, of MuJoCo's plugin of signed distances: its thread should hold
     it."""
+    names = {"nut": 0.26, "bolt": 0.255}
+    key = '<config key="radius" value="{}"/>'
     named = "".join(
-        f'<plugin plugin="mujoco.sdf.{name}"><instance name="{name}"><config key="radius" '
-        f'value="{radius}"/></instance>'
-        "</plugin>"
-        for name, radius in (("nut", 0.26), ("bolt", 0.255))
+        f'<plugin plugin="mujoco.sdf.{name}"><instance name="{name}">{key.format(radius)}'
+        "</instance></plugin>"
+        for name, radius in names.items()
     )
-    mesh = "".join(
-        f'<mesh name="{name}"><plugin instance="{name}"/></mesh>' for name in ("nut", "bolt")
+    mesh = "".join(f'<mesh name="{name}"><plugin instance="{name}"/></mesh>' for name in names)
+    geom = (
+        '<geom type="sdf" mesh="{0}" {1} friction=".3" solref=".01 1" solimp=".95 .99 1e-4">'
+        '<plugin instance="{0}"/></geom>'
     )
-    geom = '<geom type="sdf" mesh="{0}" {1}><plugin instance="{0}"/></geom>'
-    heavy = 'mass="2"'
-    scene = (
-        f'<mujoco><extension>{named}</extension><asset>{mesh}</asset><default><geom friction=".3" '
-        f'solref=".01 1" '
-        'solimp=".95 .99 1e-4"/></default><option cone="elliptic" sdf_iterations="10" '
-        'sdf_initpoints="20"/><worldbody>'
-        f'<body name="nut" pos="0 0 .83" euler="180 0 '
-        f'0"><freejoint/>{geom.format("nut", heavy)}</body>'
-        f'<body name="bolt" euler="180 0 0">{geom.format("bolt", "")}</body></worldbody></mujoco>'
+    heavy = geom.format("nut", 'mass="2"')
+    bodies = (
+        f'<body name="nut" pos="0 0 .83" euler="180 0 0"><freejoint/>{heavy}</body>'
+        f'<body name="bolt" euler="180 0 0">{geom.format("bolt", "")}</body>'
     )
-    run = Run(way, mujoco.MjModel.from_xml_string(scene), passive=True)
+    more = f"<extension>{named}</extension><asset>{mesh}</asset>"
+    option = 'sdf_iterations="10" sdf_initpoints="20"'
+    run = Run(way, model(bodies, option, more), passive=True)
     run.advance(1)
     return run.found({CREEP: run.creep("nut")}, {"left the bolt": run.places("nut")[0, 2] < 0.4})
 
 
 def tactile(way: Way) -> Found:
     """A plate on a pad of 36 sprung spheres, each with a sensor of touch, on a slope of 15°."""
+    at = list(itertools.product(range(6), range(6)))
+    sprung = '<joint type="slide" axis="0 0 1" stiffness="300" damping="1"/>'
     pad = "".join(
-        f'<body pos="{0.01 * i} {0.01 * j} 0"><joint type="slide" axis="0 0 1" stiffness="300" '
-        f'damping="1"/>'
-        f'<geom size=".004" mass=".001"/><site name="s{i}{j}" size=".004"/></body>'
-        for i in range(6)
-        for j in range(6)
+        f'<body pos="{0.01 * i} {0.01 * j} 0">{sprung}<geom size=".004" mass=".001"/>'
+        f'<site name="s{i}{j}" size=".004"/></body>'
+        for i, j in at
     )
-    touch = "".join(f'<touch site="s{i}{j}"/>' for i in range(6) for j in range(6))
+    touch = "".join(f'<touch site="s{i}{j}"/>' for i, j in at)
     plate = free("plate", ".025 .025 .009", 'type="box" size=".04 .04 .005" mass=".2"')
     run = Run(way, model(pad + plate, slope=15, more=f"<sensor>{touch}</sensor>"), passive=True)
     run.advance(2)
@@ -176,9 +178,8 @@ def castle(way: Way) -> Found:
     run = Run(way, model(FLOOR + bricks, slope=3), passive=True)
     run.advance(1)
     creep = run.creep(seconds=0.2)
-    return run.found(
-        {CREEP: creep}, {"fell": run.places(f"b{COURSES - 1}-0")[0, 2] < 0.06 * (COURSES - 1)}
-    )
+    top = run.places(f"b{COURSES - 1}-0")[0, 2]
+    return run.found({CREEP: creep}, {"fell": top < 0.06 * (COURSES - 1)})
 
 
 def sleeping(way: Way) -> Found:
@@ -186,10 +187,9 @@ def sleeping(way: Way) -> Found:
     a push."""
     if not hasattr(mujoco.mjtEnableBit, "mjENBL_SLEEP"):
         raise NotImplementedError(f"MuJoCo {mujoco.__version__} does not sleep")
+    box = 'type="box" size=".05 .05 .05"'
     boxes = "".join(
-        free(f"t{k}-{j}", f"{0.3 * k} 0 {0.05 + 0.1 * j}", 'type="box" size=".05 .05 .05"')
-        for k in range(3)
-        for j in range(3)
+        free(f"t{k}-{j}", f"{0.3 * k} 0 {0.05 + 0.1 * j}", box) for k in range(3) for j in range(3)
     )
     run = Run(way, model(FLOOR + boxes, slope=8, extra='<flag sleep="enable"/>'), passive=True)
     run.advance(4)
@@ -203,25 +203,18 @@ def mocap(way: Way) -> Found:
         '<body pos="0 {0} -.08"><joint name="f{1}" type="slide" axis="0 {2} 0" damping="5"/>'
         '<geom type="box" size=".015 .01 .04" mass=".1"/></body>'
     )
+    palm = '<geom type="box" size=".03 .08 .02" mass=".5" contype="0" conaffinity="0"/>'
+    fingers = finger.format(-0.05, 1, 1) + finger.format(0.05, 2, -1)
     hand = (
-        '<body name="target" mocap="true" pos="0 0 .15"/><body name="hand" pos="0 0 '
-        '.15"><freejoint/>'
-        '<geom type="box" size=".03 .08 .02" mass=".5" contype="0" conaffinity="0"/>'
-        + finger.format(-0.05, 1, 1)
-        + finger.format(0.05, 2, -1)
-        + "</body>"
+        '<body name="target" mocap="true" pos="0 0 .15"/>'
+        f'<body name="hand" pos="0 0 .15"><freejoint/>{palm}{fingers}</body>'
     )
     more = (
         '<equality><weld body1="target" body2="hand" solref=".01 1"/></equality>'
         '<actuator><motor joint="f1"/><motor joint="f2"/></actuator>'
     )
-    run = Run(
-        way,
-        model(
-            FLOOR + hand + free("box", "0 0 .03", 'type="box" size=".03 .03 .03" mass=".2"'),
-            more=more,
-        ),
-    )
+    box = free("box", "0 0 .03", 'type="box" size=".03 .03 .03" mass=".2"')
+    run = Run(way, model(FLOOR + hand + box, more=more))
     data, target = run.data, run.data.mocap_pos[0]
     data.ctrl[:] = 8
     run.advance(0.5)
@@ -229,23 +222,22 @@ def mocap(way: Way) -> Found:
     run.advance(1, lambda: target.__setitem__(2, 0.15 + 0.1 * min(data.time - 0.5, 1)))
     run.advance(0.5)
     creep, begin, before = run.creep("box", of="hand"), data.time, run.places("box", of="hand")
-    run.advance(
-        1, lambda: target.__setitem__(0, 0.02 * math.sin(8 * math.pi * (data.time - begin)))
-    )
+
+    def shake() -> None:
+        target[0] = 0.02 * math.sin(8 * math.pi * (data.time - begin))
+
+    run.advance(1, shake)
     run.advance(0.5)
-    slip = float(np.abs(run.places("box", of="hand") - before).max())
-    return run.found(
-        {CREEP: creep, SLIP: slip},
-        {"dropped": abs(run.places("box", of="hand") - start).max() > 0.02},
-    )
+    there = run.places("box", of="hand")
+    slip, dropped = np.abs(there - before).max(), abs(there - start).max() > 0.02
+    return run.found({CREEP: creep, SLIP: slip}, {"dropped": dropped})
 
 
 def tendon(way: Way) -> Found:
     """A weight of 3 N on a tendon over a pulley, whose dry friction of 5 N should hold it."""
     world = (
-        '<site name="above" pos="0 0 1"/><body name="weight" pos="0 0 .5"><joint type="slide" '
-        'axis="0 0 1"/>'
-        '<geom size=".05" mass=".306"/><site name="hook"/></body>'
+        '<site name="above" pos="0 0 1"/><body name="weight" pos="0 0 .5"><site name="hook"/>'
+        '<joint type="slide" axis="0 0 1"/><geom size=".05" mass=".306"/></body>'
     )
     sites = '<site site="above"/><site site="hook"/>'
     tendon = f'<tendon><spatial frictionloss="5">{sites}</spatial></tendon>'
@@ -257,19 +249,15 @@ def tendon(way: Way) -> Found:
 def soft_grip() -> Any:
     """A box between two soft pads of finite elements."""
     pad = (
-        '<body name="{0}" pos="0 {1} .2"><joint name="{0}" type="slide" axis="0 {2} 0" '
-        'damping="20"/>'
+        '<body name="{0}" pos="0 {1} .2">'
+        '<joint name="{0}" type="slide" axis="0 {2} 0" damping="20"/>'
         '<geom type="box" size=".03 .005 .03" mass=".2" pos="0 {3} 0" contype="0" conaffinity="0"/>'
         '<flexcomp name="p{0}" type="grid" count="4 3 4" spacing=".015 .01 .015" dim="3" '
-        'radius=".001" mass=".05">'
-        '<contact selfcollide="none" solref=".01 1"/><edge equality="true"/>'
-        '<pin gridrange="0 {4} 0 3 {4} 3"/></flexcomp></body>'
+        'radius=".001" mass=".05"><contact selfcollide="none" solref=".01 1"/>'
+        '<edge equality="true"/><pin gridrange="0 {4} 0 3 {4} 3"/></flexcomp></body>'
     )
-    world = (
-        pad.format("left", -0.041, 1, -0.015, 0)
-        + pad.format("right", 0.041, -1, 0.015, 2)
-        + free("box", "0 0 .2", 'type="box" size=".03 .03 .03" mass=".1"')
-    )
+    pads = pad.format("left", -0.041, 1, -0.015, 0) + pad.format("right", 0.041, -1, 0.015, 2)
+    world = pads + free("box", "0 0 .2", 'type="box" size=".03 .03 .03" mass=".1"')
     actuators = '<actuator><motor joint="left"/><motor joint="right"/></actuator>'
     return model(world, 'integrator="implicitfast"', more=actuators, mu=1)
 
@@ -288,15 +276,10 @@ def flex(way: Way) -> Found:
 def rolling(way: Way) -> Found:
     """A wheel and a ball that roll at .5 m/s: what they lose of it in a second."""
     ball, wheel = 'size=".05" mass="1"', 'type="cylinder" size=".05 .02" mass="1" euler="90 0 0"'
-    run = Run(
-        way,
-        model(FLOOR + free("ball", "0 0 .0499", ball) + free("wheel", "0 .5 .0499", wheel)),
-        passive=True,
-    )
+    world = FLOOR + free("ball", "0 0 .0499", ball) + free("wheel", "0 .5 .0499", wheel)
+    run = Run(way, model(world), passive=True)
     for first in (0, 6):
         run.data.qvel[first], run.data.qvel[first + 4] = 0.5, 10.0
     run.advance(1)
-    ball_lost, wheel_lost = 0.5 - run.data.qvel[[0, 6]]
-    return run.found(
-        {"speed the ball loses, m/s": ball_lost, "speed the wheel loses, m/s": wheel_lost}
-    )
+    names = "speed the ball loses, m/s", "speed the wheel loses, m/s"
+    return run.found(dict(zip(names, 0.5 - run.data.qvel[[0, 6]], strict=True)))

@@ -11,7 +11,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -36,26 +36,19 @@ def processor_time(work: Callable[[], object]) -> float:
     return time.process_time() - begin
 
 
-class Stepper(Protocol):
-    """Steps a simulation, at once or in two halves between which a controller may act."""
-
-    model: Any
-
-    def step(self, data: Any, nstep: int = 1) -> None: ...
-    def step1(self, data: Any) -> None: ...
-    def step2(self, data: Any) -> None: ...
+Stepper = Any
+"""What steps data of a `model`: `step(data, nstep=1)`, or `step1(data)` and `step2(data)`, between
+which a controller may act."""
 
 
-class Halves:
-    """MuJoCo's two halves of a step; what has to be done between them comes with a subclass."""
+class Plain:
+    """MuJoCo alone."""
 
     def __init__(self, model: Any) -> None:
         self.model = model
 
     def step(self, data: Any, nstep: int = 1) -> None:
-        for _ in range(nstep):
-            self.step1(data)
-            self.step2(data)
+        mujoco.mj_step(self.model, data, nstep)
 
     def step1(self, data: Any) -> None:
         mujoco.mj_step1(self.model, data)
@@ -64,14 +57,7 @@ class Halves:
         mujoco.mj_step2(self.model, data)
 
 
-class Plain(Halves):
-    """MuJoCo alone."""
-
-    def step(self, data: Any, nstep: int = 1) -> None:
-        mujoco.mj_step(self.model, data, nstep)
-
-
-class PairPose(Halves):
+class PairPose(Plain):
     """The idea of MuJoCo's pull request 3349: bodies that stick have a relative pose; a spring
     takes them back to it.
 
@@ -83,22 +69,20 @@ class PairPose(Halves):
         super().__init__(model)
         self._poses: dict[tuple[int, int], tuple[Array, Array]] = {}
 
+    def step(self, data: Any, nstep: int = 1) -> None:
+        for _ in range(nstep):
+            self.step1(data)
+            self.step2(data)
+
     def step2(self, data: Any) -> None:
         contact = data.contact
-        used = np.flatnonzero(
-            (contact.efc_address >= 0) & (contact.dim > 1) & (contact.geom >= 0).all(axis=1)
-        )
-        rows, frames, points = (
-            contact.efc_address[used],
-            contact.frame[used].reshape(-1, 3, 3),
-            contact.pos[used],
-        )
-        pairs = [
-            (int(one), int(other)) for one, other in self.model.geom_bodyid[contact.geom[used]]
-        ]
+        rubs = (contact.efc_address >= 0) & (contact.dim > 1) & (contact.geom >= 0).all(axis=1)
+        used = np.flatnonzero(rubs)
+        rows = contact.efc_address[used]
+        pairs = [(one, other) for one, other in self.model.geom_bodyid[contact.geom[used]].tolist()]
         self._poses = {pair: self._poses.get(pair) or self._pose(data, *pair) for pair in pairs}
-        for pair, row, frame, point in zip(pairs, rows, frames, points, strict=True):
-            slip = frame[1:] @ self._slip(data, pair, point)
+        for k, pair, row in zip(used, pairs, rows, strict=True):
+            slip = contact.frame[k].reshape(3, 3)[1:] @ self._slip(data, pair, contact.pos[k])
             stiffness = data.efc_KBIP[row, 0] * data.efc_KBIP[row, 2]
             data.efc_aref[row + 1 : row + 3] -= stiffness * slip
         friction = contact.friction[used, :2]
@@ -130,6 +114,12 @@ class Way:
     stepper: Callable[[Any], Stepper] = Plain
     options: dict[str, Any] = field(default_factory=dict)
     timed: bool = True
+
+    def begin(self, model: Any) -> Stepper:
+        """What steps a model, which gets the options."""
+        for name, value in self.options.items():
+            setattr(model.opt, name, value)
+        return self.stepper(model)
 
 
 WAYS = {
@@ -176,10 +166,8 @@ class Run:
     """Steps a model one way and keeps the account of which `Found` is the sum."""
 
     def __init__(self, way: Way, model: Any, data: Any = None, passive: bool = False) -> None:
-        for name, value in way.options.items():
-            setattr(model.opt, name, value)
+        self._stepper, self._spent, self._steps = way.begin(model), 0.0, 0
         self.model, self.data, self.passive = model, data or mujoco.MjData(model), passive
-        self._stepper, self._spent, self._steps, self._begin = way.stepper(model), 0.0, 0, 0.0
         self._contacts, self._depth, self._least, self._rise = 0, 0.0, math.inf, 0.0
 
     def advance(self, seconds: float, between: Callable[[], None] | None = None) -> None:
@@ -202,26 +190,17 @@ class Run:
             self._contacts = max(self._contacts, int(self.data.ncon))
             self._depth = max(self._depth, float(-self.data.contact.dist.min()))
         if self.passive:
-            self._energy()
+            mujoco.mj_energyPos(self.model, self.data)
+            mujoco.mj_energyVel(self.model, self.data)
+            energy = float(self.data.energy.sum())
+            self._least = min(self._least, energy)
+            self._rise = max(self._rise, energy - self._least)
 
-    def _energy(self) -> None:
-        mujoco.mj_energyPos(self.model, self.data)
-        mujoco.mj_energyVel(self.model, self.data)
-        energy = float(self.data.energy.sum())
-        self._least = min(self._least, energy)
-        self._rise = max(self._rise, energy - self._least)
-
-    def creep(
-        self,
-        *bodies: str,
-        of: str | None = None,
-        seconds: float = 1.0,
-        between: Callable[[], None] | None = None,
-    ) -> float:
+    def creep(self, *bodies: str, of: str | None = None, seconds: float = 1.0) -> float:
         """Mean speed at which bodies leave their places in the axes of another, of the fastest,
         m/s."""
         before = self.places(*bodies, of=of)
-        self.advance(seconds, between)
+        self.advance(seconds)
         return float(np.abs(self.places(*bodies, of=of) - before).max()) / seconds
 
     def places(self, *bodies: str, of: str | None = None) -> Array:

@@ -1,23 +1,26 @@
 """Coulomb's law can't hurt the program that it is in, whatever that does: MuJoCo's own errors, or
 one line.
 
-What may end a process is tried in another one: its function is below, without `test_`, and what
-it prints is its answer. One process answers all, and where it ends another one goes on."""
+What may end a process is tried `apart`, in another one."""
 
 import contextlib
 import copy
 import faulthandler
 import functools
 import gc
-import json
 import math
+import multiprocessing
+import os
 import pickle
 import re
 import shutil
 import subprocess
 import sys
+import tempfile
 import textwrap
 import threading
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 import mujoco
@@ -30,9 +33,9 @@ from tests.mjsim import random_models
 
 ROOT = Path(__file__).parents[2]
 FULL, INTEGRATION = mujoco.mjtState.mjSTATE_FULLPHYSICS, mujoco.mjtState.mjSTATE_INTEGRATION
-BOTH = [False], [True]
-"""Soft and rigid."""
 WAYS = pytest.mark.parametrize("rigid", [False, True], ids=["soft", "rigid"])
+TIMEOUT = 600.0
+"""After how many seconds another process gives up: compiling, too, takes time."""
 BOXES = "".join(
     f'<body pos="{0.03 * (i % 2)} 0 {0.06 + 0.11 * i}"><freejoint/>'
     '<geom type="box" size=".05 .05 .05"/></body>'
@@ -54,51 +57,36 @@ def scene(option="", actuator="", more=""):
     return model, mujoco.MjData(model)
 
 
-class Other:
-    """Another process, which calls functions of this file; once it has ended, a new one."""
-
-    END, TIMEOUT = "that is all", 600.0
-    """What it prints last, and after how many seconds it gives up: compiling, too, takes time."""
-
-    def __init__(self, where):
-        self.where, self.process = where, None
-
-    def __call__(self, function, *calls):
-        """What a function prints that is called once with each of what is given."""
-        with (self.where / "errors").open("a+") as errors:
-            self.process = self.process or subprocess.Popen(
-                [sys.executable, "-X", "faulthandler", __file__],
-                cwd=self.where,  # where MuJoCo logs
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=errors,
-                text=True,
-            )
-            print(json.dumps([function.__name__, calls]), file=self.process.stdin, flush=True)
-            lines = []
-            for line in self.process.stdout:
-                if line.rstrip() == self.END:
-                    return lines
-                lines.append(line.rstrip())
-            errors.seek(0)
-            pytest.fail(f"exit code {self.end()}\n{errors.read()[-3000:]}")
-
-    def end(self):
-        process, self.process = self.process, None
-        with process:  # which closes its input
-            pass
-        return process.returncode
+@functools.cache
+def another_process():
+    """One serves all; it begins where MuJoCo may log."""
+    context, logs = multiprocessing.get_context("spawn"), (tempfile.gettempdir(),)
+    return ProcessPoolExecutor(1, context, os.chdir, logs)
 
 
-@pytest.fixture(scope="module")
-def alone(tmp_path_factory):
-    """Call a function of this file in another process, once with each of what is given.
+@pytest.fixture(scope="module", autouse=True)
+def its_end():
+    yield
+    another_process().shutdown()
 
-    Returns what it prints."""
-    other = Other(tmp_path_factory.mktemp("other"))
-    yield other
-    if other.process:
-        other.end()
+
+def apart(test):
+    """The test in another process; where it ends that, a new one is for the next."""
+
+    @functools.wraps(test)
+    def carried_out(**given):
+        if multiprocessing.parent_process():
+            faulthandler.enable()
+            faulthandler.dump_traceback_later(TIMEOUT, exit=True)
+            test(**given)
+            return faulthandler.cancel_dump_traceback_later()
+        try:
+            return another_process().submit(carried_out, **given).result()
+        except BrokenProcessPool:
+            another_process.cache_clear()
+            raise
+
+    return carried_out
 
 
 # -- copies ----------------------------------------------------------------------------------------
@@ -116,7 +104,9 @@ class Environment:
         return self.data.qpos.copy()
 
 
-def copied(rigid):
+@apart
+@WAYS
+def test_copies(rigid):
     """Copies of the law, and of all there is, go on to the bit, and outlive what they are of."""
     environment = Environment(rigid)
     environment.step(100)
@@ -134,10 +124,10 @@ def copied(rigid):
     ends += [other.step(1) for other in others]
     assert all((end == ends[0]).all() for end in ends[:6])
     assert all((end == ends[6]).all() for end in ends[6:])
-    print("equal")
 
 
-def copied_after_installed(rigid):
+@WAYS
+def test_copies_after_installed(rigid):
     """Of data that it has never seen the law can't find the last forces: a copy says so."""
     one = Environment(rigid)
     with one.law.installed():
@@ -149,31 +139,21 @@ def copied_after_installed(rigid):
     one.law.state(one.data)
     other = copy.deepcopy(one)
     assert (one.step(50) == other.step(50)).all()
-    print("equal")
 
 
-def unpickled(path):
-    """Another process goes on from a pickle as this one does."""
-    law, data = pickle.loads(Path(path).read_bytes())
+def unpickled(kept):
+    """A pickle goes on to there."""
+    law, data = pickle.loads(kept)
     law.step(data, 60)
-    print(data.qpos.tobytes().hex())
-
-
-def copies(rigid):
-    copied(rigid)
-    copied_after_installed(rigid)
-
-
-def test_copies(alone):
-    assert alone(copies, *BOTH) == ["equal"] * 4
+    return data.qpos
 
 
 @WAYS
-def test_pickles_in_another_process(alone, tmp_path, rigid):
-    here, path = Environment(rigid), tmp_path / "kept"
+def test_pickles_in_another_process(rigid):
+    here = Environment(rigid)
     here.step(100)
-    path.write_bytes(pickle.dumps((here.law, here.data)))
-    assert alone(unpickled, [str(path)]) == [here.step(60).tobytes().hex()]
+    there = another_process().submit(unpickled, pickle.dumps((here.law, here.data)))
+    assert (there.result() == here.step(60)).all()
 
 
 # -- errors ----------------------------------------------------------------------------------------
@@ -232,15 +212,12 @@ def raised_in(kind, rigid, entry):
     return found, round(data.time / model.opt.timestep)
 
 
-def callbacks(kind):
-    for rigid in (False, True):
-        for entry in ENTRIES:
-            assert raised_in(kind, rigid, entry) == raised_in(kind, rigid, "plain")
-    print("as plain")
-
-
-def test_callbacks_that_raise(alone):
-    assert alone(callbacks, *([kind] for kind in CALLBACKS)) == ["as plain"] * len(CALLBACKS)
+@apart
+@pytest.mark.parametrize("kind", CALLBACKS)
+@WAYS
+def test_callbacks_that_raise(kind, rigid):
+    for entry in ENTRIES:
+        assert raised_in(kind, rigid, entry) == raised_in(kind, rigid, "plain")
 
 
 def outcome(step, count=40):
@@ -253,10 +230,10 @@ def outcome(step, count=40):
     return "none"
 
 
-ARENAS = ("Newton", "step"), ("PGS", "installed")
-
-
-def small_arenas(rigid, solver, entry):
+@apart
+@pytest.mark.parametrize(("solver", "entry"), [("Newton", "step"), ("PGS", "installed")])
+@WAYS
+def test_memory_that_is_too_small(rigid, solver, entry):
     """Every size of MuJoCo's memory, from the least, is enough, or an error of MuJoCo's.
 
     Rigid contacts are seen earlier, so that these need another size than plain ones."""
@@ -280,18 +257,14 @@ def small_arenas(rigid, solver, entry):
     Coulomb(model, rigid=rigid).step(data, 50)  # lives on
     assert mujoco.get_mjcb_control() is None
     assert data.time == pytest.approx(50 * model.opt.timestep)
-    print(f"{same} of {tried} as plain")
-
-
-def test_memory_that_is_too_small(alone):
-    ways = [(rigid, *way) for rigid in (False, True) for way in ARENAS]
-    assert all(line.endswith("as plain") for line in alone(small_arenas, *ways))
 
 
 # -- what is gone, or another's --------------------------------------------------------------------
 
 
-def gone(rigid):
+@apart
+@WAYS
+def test_what_is_gone_or_anothers(rigid):
     """Data and models that are freed, compiled anew, or another's."""
     model, data = scene()
     law = Coulomb(model, rigid=rigid)
@@ -338,11 +311,6 @@ def gone(rigid):
     law = Coulomb(anew, rigid=rigid)
     law.step(theirs, 40)
     assert np.isfinite(theirs.qpos).all()
-    print("refused")
-
-
-def test_what_is_gone_or_anothers(alone):
-    assert alone(gone, *BOTH) == ["refused", "refused"]
 
 
 def refusal(law, state):
@@ -354,7 +322,9 @@ def refusal(law, state):
     return ""
 
 
-def restored(rigid):
+@apart
+@WAYS
+def test_states_that_are_none(rigid):
     """States that are cut, of other kinds, foreign or not finite."""
     model, data = scene()
     law = Coulomb(model, rigid=rigid)
@@ -390,11 +360,7 @@ def restored(rigid):
     huge["state"] = 77
     law.restore(state | {"contacts": huge}, data)
     law.step(data, 20)
-    print(sum(map(bool, refusals)))
-
-
-def test_states_that_are_none(alone):
-    assert all(int(refused) >= 30 for refused in alone(restored, *BOTH))
+    assert sum(map(bool, refusals)) >= 30
 
 
 # -- wrong types -----------------------------------------------------------------------------------
@@ -461,7 +427,10 @@ def test_a_state_that_is_set_begins_anew(rigid, before):
     assert (ends[3] == ends[5]).all()
 
 
-def rolled_out(rigid, steps):
+@apart
+@pytest.mark.parametrize("steps", [40, 1])
+@WAYS
+def test_rollouts_of_equal_starts_are_equal(rigid, steps):
     """Eight equal starts, in one thread and in two."""
     model, data = scene()
     mujoco.mj_step(model, data, 60)
@@ -478,12 +447,7 @@ def rolled_out(rigid, steps):
         ends += list(found[:, -1])
     plain, _ = mujoco.rollout.rollout(model, mujoco.MjData(model), kept, nstep=steps)
     assert (plain[0, -1] != ends[0]).any()
-    print("equal" if all((end == ends[0]).all() for end in ends) else "unequal")
-
-
-@pytest.mark.parametrize("steps", [40, 1])
-def test_rollouts_of_equal_starts_are_equal(alone, steps):
-    assert alone(rolled_out, [False, steps], [True, steps]) == ["equal", "equal"]
+    assert all((end == ends[0]).all() for end in ends)
 
 
 LIMITS = (
@@ -529,7 +493,8 @@ def test_where_nothing_touches_all_is_mujocos_own(integrator, joint, solver):
 # -- several at once -------------------------------------------------------------------------------
 
 
-def crowd():
+@apart
+def test_threads_and_laws_at_once():
     """Laws of one model and of two, soft and rigid, in threads, whose cone is a pyramid's."""
     model, _ = scene('cone="pyramidal"')
     stiff, _ = scene('cone="pyramidal"')
@@ -555,24 +520,6 @@ def crowd():
         for data in datas[begin : begin + 3]:
             assert (data.qpos == single.qpos).all()
     assert mujoco.get_mjcb_control() is None
-    print("equal")
-
-
-def test_threads_and_laws_at_once(alone):
-    assert alone(crowd, []) == ["equal"]
-
-
-def test_halves_on_a_pyramid_are_whole_steps():
-    """Also where a program has found constraints by the pyramid between both halves."""
-    model, data = scene('cone="pyramidal"')
-    halves, law = mujoco.MjData(model), Coulomb(model)
-    for _ in range(60):
-        law.step1(halves)
-        mujoco.mj_fwdPosition(model, halves)
-        law.step2(halves)
-        law.step(data)
-    assert model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL
-    assert (halves.qpos == data.qpos).all()
 
 
 @WAYS
@@ -699,10 +646,14 @@ def fastest(model, step, data):
     return largest
 
 
-def anything(first, last, rigid):
-    """Random models: which ones blow up where plain MuJoCo doesn't; a crash is told by the seed."""
+@apart
+@pytest.mark.parametrize("seeds", [(0, 4), pytest.param((4, 400), marks=pytest.mark.slow)], ids=str)
+@WAYS
+def test_random_models_end_nothing(seeds, rigid):
+    """None crashes, exits or hangs, which is told by its seed; those that blow up where plain
+    MuJoCo doesn't are counted."""
     blown = []
-    for seed in range(first, last):
+    for seed in range(*seeds):
         print(seed, file=sys.stderr, flush=True)
         model = random_models.model(seed, rigid)
         plain, data = mujoco.MjData(model), mujoco.MjData(model)
@@ -712,23 +663,4 @@ def anything(first, last, rigid):
             if fastest(model, step, data) > FASTER * max(usual, 5.0):
                 blown.append(seed)
         assert mujoco.get_mjcb_control() is None
-    print(json.dumps(blown))
-
-
-@pytest.mark.parametrize("seeds", [(0, 4), pytest.param((4, 400), marks=pytest.mark.slow)], ids=str)
-def test_random_models_end_nothing(alone, seeds):
-    """None crashes, exits or hangs; those that blow up where plain MuJoCo doesn't are counted."""
-    blown = [json.loads(each) for each in alone(anything, [*seeds, False], [*seeds, True])]
-    for way, those in zip(("soft", "rigid"), blown, strict=True):
-        print(f"{way}: {len(those)} of {seeds[1] - seeds[0]} blow up: {those}")
-
-
-if __name__ == "__main__":
-    sys.path[0] = str(ROOT)
-    for asked in sys.stdin:
-        name, calls = json.loads(asked)
-        faulthandler.dump_traceback_later(Other.TIMEOUT, exit=True)
-        for call in calls:
-            globals()[name](*call)
-        faulthandler.cancel_dump_traceback_later()
-        print(Other.END, flush=True)
+    print(f"{len(blown)} of {seeds[1] - seeds[0]} blow up: {blown}")

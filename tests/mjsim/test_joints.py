@@ -14,6 +14,7 @@ from mjsim.stepping import SHARE
 from model import Case, Parameters, State
 
 P = Parameters.named("reference")
+SINKS = Parameters(m=0.029, r=0.013, R=0.042, j=0.57, mu=0.5, eta=0.8, g=8.4, c=4.0, omega_0=7.2)
 
 
 @pytest.mark.parametrize(
@@ -52,14 +53,17 @@ def test_what_rolls_doesnt_slip_while_it_settles():
     assert max(run.slip_speed_A[rolls][5:].max(), run.slip_speed_B[rolls][5:].max()) < 1e-7
 
 
-def test_loads_are_steady_however_much_friction_lifts() -> None:
+@pytest.mark.parametrize("step", [4e-3, 2e-3])
+@pytest.mark.parametrize("p", [P.replace(omega_0=7.0, eta=0.8), SINKS])
+def test_loads_are_steady_however_much_friction_lifts(p, step) -> None:
     """A ball that sinks along a rough wall: there errors of the slip that is predicted grow from
-    step to step, until a step is solved, and loads went to and fro by 4e-4."""
-    p = P.replace(omega_0=7.0, eta=0.8)
-    exact = State.one(analytic.solution(p, "NS").state)._replace(y=100.0)
-    run = mjsim.simulate(p, exact, 4.0, settings=mjsim.RigidContacts(timestep=4e-3))
+    step to step, until a step is solved, and loads went to and fro by 4e-4. Its axis goes round
+    with the fluid for ever, and its slip with it, so that what is predicted of that is always a
+    little wrong; solved for in every other step alone, loads went up and down by 4 %."""
+    exact = State.one(analytic.solution(p, "NS").state)._replace(y=1e3)
+    run = mjsim.simulate(p, exact, 10.0, settings=mjsim.RigidContacts(timestep=step))
     load = p.m * (p.R * exact.omega_c**2)
-    assert run.force_B[-100:, 0] == pytest.approx(load, abs=3 * SHARE * p.m * p.g)
+    assert run.force_B[len(run.time) // 2 :, 0] == pytest.approx(load, abs=3 * SHARE * p.m * p.g)
 
 
 @pytest.mark.parametrize("step", [6e-5, 4e-5, 1e-5])

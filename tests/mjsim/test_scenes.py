@@ -13,15 +13,6 @@ def both(run):
     return run(WAYS["plain"]), run(WAYS["soft"])
 
 
-def assert_no_worse(plain, soft):
-    """Nothing went wrong, nothing sinks in deeper, energy rises no higher."""
-    assert not soft.wrong
-    # what slides is lifted out of its depth in plain MuJoCo alone
-    assert soft.depth <= 1.3 * plain.depth
-    if plain.rise is not None:
-        assert soft.rise <= WORSE * plain.rise + 1e-3
-
-
 STILL = {name: SCENES[name].run for name in ("treadmill", "nut", "tactile", "mocap", "sleeping")}
 STILL |= {"castle": small_scenes.castle, "dominos": lambda way: small_scenes.pushed(way, push=3.5)}
 """Of dominos one push: fallen, two rows in three jerk once in some seconds as an edge on a face
@@ -30,11 +21,17 @@ loses a point."""
 
 @pytest.mark.parametrize("name", STILL)
 def test_what_should_hold_still_does(name, monkeypatch):
-    """Its creep is at least a hundred times less."""
+    """Its creep is at least a hundred times less, and the slip of what is shaken ten times."""
     monkeypatch.setattr(small_scenes, "COURSES", 2)
     plain, soft = both(STILL[name])
     assert soft.values[CREEP] < 1e-2 * plain.values[CREEP]
-    assert_no_worse(plain, soft)
+    assert soft.values.get(SLIP, 0) <= 0.1 * plain.values.get(SLIP, 0)
+    # nothing went wrong, nothing sinks in deeper, energy rises no higher
+    assert not soft.wrong
+    # what slides is lifted out of its depth in plain MuJoCo alone
+    assert soft.depth <= 1.3 * plain.depth
+    if plain.rise is not None:
+        assert soft.rise <= WORSE * plain.rise + 1e-3
 
 
 def test_a_dry_tendon_holds_under_rigid_contacts_alone():
@@ -42,11 +39,6 @@ def test_a_dry_tendon_holds_under_rigid_contacts_alone():
     plain, soft = both(SCENES["tendon"].run)
     assert soft.values[CREEP] == plain.values[CREEP]
     assert SCENES["tendon"].run(WAYS["rigid"]).values[CREEP] < 1e-2 * plain.values[CREEP]
-
-
-def test_a_shaken_grip_slips_less():
-    plain, soft = both(small_scenes.mocap)
-    assert soft.values[SLIP] < 0.1 * plain.values[SLIP]
 
 
 def test_a_carousel_holds_what_stands_on_it():
