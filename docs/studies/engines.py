@@ -43,77 +43,50 @@ def verdicts(results: Path) -> list[Verdict]:
 def counted(results: Path) -> Rows:
     """How many claims each engine was asked, and how they came out, with its deviations at a step
     of 2 ms."""
-    said = verdicts(results)
-    told = wording.engines(said)
-    head = [
-        "engine",
-        "asked",
-        "confirmed",
-        "to",
-        "at worst",
-        "refuted",
-        "inconclusive",
-        "typical deviation",
-        "worst",
-    ]
-    for row in told:
-        expected = sum(row["refuted"].values())
-        row["refuted"] = f"{len(row['refuted'])}" + (
-            f" ({expected} as expected)" if expected else ""
-        )
-        row["to"], _, row["at worst"] = row["to"].partition(", at worst ")
-    rows = [
-        [row[name] for name in ("engine", *head[1:6], "open", "typical", "worst")] for row in told
-    ]
-    return [head, *rows]
+    head = ["engine", "asked", "confirmed", "to", "at worst", "refuted", "inconclusive"]
+    rows = [[*head, "typical deviation", "worst"]]
+    for row in wording.engines(verdicts(results)):
+        to, _, at_worst = row["to"].partition(", at worst ")
+        refuted, expected = str(len(row["refuted"])), sum(row["refuted"].values())
+        refuted += f" ({expected} as expected)" if expected else ""
+        asked = [row[name] for name in ("engine", "asked", "confirmed")]
+        rows.append([*asked, to, at_worst, refuted, row["open"], row["typical"], row["worst"]])
+    return rows
 
 
 def verdict(results: Path) -> Rows:
     """What README tells of each engine: how many of the claims that it was asked came out how."""
     rows = [["engine", "confirmed", "refuted", "inconclusive"]]
     for row in wording.engines(verdicts(results)):
-        falsely = sum(not expected for expected in row["refuted"].values())
-        due = len(row["refuted"]) - falsely
-        refuted = f"{falsely}" + (f", and {due} that should be" if due else "")
-        rows.append(
-            [f"`{row['engine']}`", f"{row['confirmed']} of {row['asked']}", refuted, row["open"]]
-        )
-    return [rows[0], *(row for row in rows[1:] if "mujoco" in row[0])]
+        if "mujoco" in row["engine"]:
+            falsely = sum(not expected for expected in row["refuted"].values())
+            due = len(row["refuted"]) - falsely
+            refuted = f"{falsely}" + (f", and {due} that should be" if due else "")
+            confirmed = f"{row['confirmed']} of {row['asked']}"
+            rows.append([f"`{row['engine']}`", confirmed, refuted, row["open"]])
+    return rows
 
 
 def limits(results: Path) -> Rows:
     """How far plain MuJoCo is from theory in the zero-step limit, and how sure that is, by
     quantity."""
-    rows = [
-        [
-            "in the zero-step limit",
-            "numbers",
-            "median deviation",
-            "worst deviation",
-            "tolerance of the worst",
-        ]
-    ]
+    head = ["in the zero-step limit", "numbers", "median deviation", "worst deviation"]
+    rows = [[*head, "tolerance of the worst"]]
     own = [w for v in verdicts(results) for w in v.engines if w.engine == PLAIN.name]
+    checks = {
+        (c.measurement.quantity, c.measurement.value): c
+        for w in own
+        for c in w.checks
+        if c.scale > 0
+    }
+    equal = [c for c in checks.values() if c.relation is Relation.EQUAL]
     for text, names in QUANTITIES.items():
-        checks = {
-            (c.measurement.quantity, c.measurement.value): c
-            for w in own
-            for c in w.checks
-            if c.scale > 0
-        }
-        equal = [c for c in checks.values() if c.relation is Relation.EQUAL]
         found = [c for c in equal if c.measurement.quantity.startswith(names)]
         off = [
             (abs(c.deviation) / c.scale, c.resolution) for c in found if math.isfinite(c.predicted)
         ]
-        worst, tolerance = max(off)
-        rows.append(
-            [
-                text,
-                str(len(off)),
-                *(f"{x:.1e}" for x in (median(x for x, _ in off), worst, tolerance)),
-            ]
-        )
+        told = median(x for x, _ in off), *max(off)
+        rows.append([text, str(len(off)), *(f"{x:.1e}" for x in told)])
     return rows
 
 
@@ -121,9 +94,8 @@ def limits(results: Path) -> Rows:
 def _required(times: float) -> Iterator[None]:
     """All required resolutions multiplied."""
     known = quantities.QUANTITIES
-    with mock.patch.dict(
-        known, {name: replace(q, resolution=times * q.resolution) for name, q in known.items()}
-    ):
+    other = {name: replace(q, resolution=times * q.resolution) for name, q in known.items()}
+    with mock.patch.dict(known, other):
         yield
 
 
@@ -152,11 +124,8 @@ def chosen(results: Path) -> Rows:
         cells = []
         for times in (0.5, 2.0):
             with multiplied(times):
-                changed = {
-                    who: outcome for who, outcome in said().items() if outcome is not now[who]
-                }
-            cells.append(
-                "; ".join(f"{who}: {outcome}" for who, outcome in changed.items()) or "none"
-            )
+                other = said().items()
+            changed = [f"{who}: {outcome}" for who, outcome in other if outcome is not now[who]]
+            cells.append("; ".join(changed) or "none")
         rows.append([name, f"{getattr(convergence, name, '')}", *cells])
     return rows

@@ -11,15 +11,14 @@ from pathlib import Path
 from compare.figures import pages
 from model.files import write_text
 from tests.mutants.theories import FOR_TESTS, THEORIES
-from tests.mutants.trial import KINDS, LONGEST, SLOWER, Judged, Trial, name_of
+from tests.mutants.trial import KINDS, LONGEST, SLOWER, Trial, name_of
 
+_ENDS = "analytic/test_hybrid::test_a_case_ends_where_its_forces_do"
 BY_HAND = {
-    "SS whose wall never opens": "analytic/test_hybrid::test_a_case_ends_where_its_forces_do",
-    "a floor without load that is never lost": (
-        "analytic/test_hybrid::test_a_case_ends_where_its_forces_do"
-    ),
-    "NR that slips by B_y alone": "analytic/test_hybrid::test_a_case_ends_where_its_forces_do",
-    "RN's slip limit 5 % late": "analytic/test_hybrid::test_a_case_ends_where_its_forces_do",
+    "SS whose wall never opens": _ENDS,
+    "a floor without load that is never lost": _ENDS,
+    "NR that slips by B_y alone": _ENDS,
+    "RN's slip limit 5 % late": _ENDS,
     "onset of slip that isn't mirrored": (
         "analytic/test_choice::test_never_beyond_what_forces_can_hold_and_continuous_where_it_ends"
     ),
@@ -45,19 +44,19 @@ OTHERS = (
 changed for it: faults, and how many were noticed in which way of `KINDS`."""
 
 
-def write(
-    path: Path, levels: Sequence[Judged], engines: Sequence[Trial], alone: Sequence[Judged] = ()
-) -> None:
-    """Write the page, and the whole list as CSV beside it: what was noticed at each level, by the
-    engines `alone`, and of wrong engines."""
-    tried = {each.name: each.trials for each in (*levels, *alone)}
+Tried = Mapping[str, Sequence[Trial]]
+"""Trials of wrong theories by who judged them: measurements of a level, all or of an engine."""
+
+
+def write(path: Path, tried: Tried, engines: Sequence[Trial]) -> None:
+    """Write the page, and the whole list as CSV beside it; also the trials of wrong engines."""
     write_text(path, page(tried, engines))
     with path.with_suffix(".csv").open("w", encoding="utf-8", newline="") as file:
         csv.writer(file, lineterminator="\n").writerows(rows(tried, engines))
 
 
-def page(tried: Mapping[str, Sequence[Trial]], engines: Sequence[Trial] = ()) -> str:
-    """The page, in Markdown, from the trials of wrong theories by who judged them."""
+def page(tried: Tried, engines: Sequence[Trial]) -> str:
+    """The page, in Markdown."""
     counts = [[f"theories, by {name}", *_counts(trials)] for name, trials in tried.items()]
     if engines:
         counts.append(["engines, measured anew", *_counts(engines)])
@@ -85,9 +84,7 @@ def _counts(trials: Sequence[Trial]) -> list[str]:
     return [str(len(tried)), *(str(kinds[kind]) for kind in KINDS)]
 
 
-def rows(
-    tried: Mapping[str, Sequence[Trial]], engines: Sequence[Trial] = ()
-) -> list[tuple[str, ...]]:
+def rows(tried: Tried, engines: Sequence[Trial]) -> list[tuple[str, ...]]:
     """All faults, a row each: what is wrong, by whom it is noticed, and the unit test that sees
     it."""
     none = ("",) * len(tried)

@@ -30,9 +30,8 @@ DURATION = 30.0
 
 def main() -> None:
     """Measure and draw."""
-    draw({engine: [reading(engine, flow) for flow in FLOWS] for engine in ENGINES}).savefig(
-        PICTURE, dpi=200
-    )
+    readings = {engine: [reading(engine, flow) for flow in FLOWS] for engine in ENGINES}
+    draw(readings).savefig(PICTURE, dpi=200)
 
 
 def reading(engine: str, flow: float) -> float:
@@ -59,9 +58,8 @@ def _curve(axes: Axes, p: Parameters) -> None:
     """The exact theory: rolling up to a limit, slipping beyond it."""
     limit = float(analytic.thresholds(p).omega_01)
     flows = np.linspace(limit, FASTEST, 100)[1:]
-    slipping = [
-        float(analytic.solution(p.replace(omega_0=w), Case.SS).state.omega_c) for w in flows
-    ]
+    sets = (p.replace(omega_0=w) for w in flows)
+    slipping = [analytic.solution(each, Case.SS).state.omega_c for each in sets]
     axes.plot([0, limit], [0, limit], color=style.COLOURS[Case.RR], lw=2.5, label="exact theory")
     axes.plot(flows, slipping, color=style.COLOURS[Case.SS], lw=2.5)
     for x, case, what in (
@@ -69,13 +67,8 @@ def _curve(axes: Axes, p: Parameters) -> None:
         (11.0, Case.SS, "SS: slips on both, lags behind"),
     ):
         axes.text(x, 17.7, what, color=style.COLOURS[case], va="top")
-    axes.set(
-        xlim=(0, FASTEST),
-        ylim=(0, 18),
-        yticks=(0, 5, 10, 15),
-        xlabel="how fast the fluid turns (rad/s)",
-        ylabel="how fast the ball\ngoes round (rad/s)",
-    )
+    axes.set(xlim=(0, FASTEST), xlabel="how fast the fluid turns (rad/s)")
+    axes.set(ylim=(0, 18), yticks=(0, 5, 10, 15), ylabel="how fast the ball\ngoes round (rad/s)")
     axes.grid(alpha=0.25)
 
 
@@ -87,9 +80,8 @@ def _sketch(axes: Axes) -> None:
     axes.add_patch(Circle((3.3, 0.7), 0.7, fc="#F5CC6B", ec="black"))
     axes.plot([0, 0], [-0.1, 2.0], color="0.4", lw=1, ls="-.")
     axes.add_patch(Arc((0, 1.4), 0.8, 0.26, theta1=120, theta2=400, color="#0072B2", lw=1.5))
-    axes.annotate(
-        "", (0.33, 1.49), xytext=(0.38, 1.31), arrowprops={"arrowstyle": "->", "color": "#0072B2"}
-    )
+    head = {"arrowstyle": "->", "color": "#0072B2"}
+    axes.annotate("", (0.33, 1.49), xytext=(0.38, 1.31), arrowprops=head)
     axes.text(0.55, 1.1, "the fluid swirls\nand carries\nthe ball round", va="center")
     axes.plot([3.3, 4.0], [0, 0.7], "o", color="black", ms=6, zorder=4)
     axes.text(3.25, 0.1, "floor", ha="center", va="bottom")

@@ -30,7 +30,7 @@ from analytic.simulation.ensemble import interval
 from compare.campaign.sweep import sobol
 from compare.figures import pages, style
 from compare.subjects.attractors.measure import with_groups
-from model import Parameters, SimulationError, State
+from model import Parameters, SimulationError, State, Trajectory
 from model.arrays import Array
 from model.files import write_text
 
@@ -76,9 +76,8 @@ def _edges(name: str, count: int) -> Array:
 
 def points(count: int) -> Array:
     """The first `count` points, shape (count, 6), in the order of `BOX`."""
-    low, high = np.array(list(BOX.values())).T
     log = np.array([name in LOGARITHMIC for name in BOX])
-    low, high = np.where(log, np.log(low), low), np.where(log, np.log(high), high)
+    low, high = (np.where(log, np.log(end), end) for end in np.array(list(BOX.values())).T)
     spread = low + sobol(len(BOX), count, 0) * (high - low)
     return np.asarray(np.where(log, np.exp(spread), spread))
 
@@ -139,24 +138,33 @@ def confirm(p: Parameters, x: npt.ArrayLike) -> Hopping | None:
     `CONFIRMING`. Raises `SimulationError` if the simulation can't go on."""
     unit = math.sqrt(p.R / p.g)
     seen = simulate(p, x, SEEN * unit, sample_interval=SEEN * unit / SEEN_SAMPLES)
-    if not any(landings(zip(seen.events.from_case, seen.events.to_case, strict=True))):
+    if not any(_lands(seen)):
         return None
     limit = periodic_limit(seen)
     if limit and limit.orbit and (count := sum(landings(limit.orbit.changes))):
         orbit = limit.orbit
-        omega_c, height = State.of(orbit.mean).omega_c / p.omega_0, float(orbit.cycle.y.max()) / p.R
         return Hopping(
-            int(count), orbit.period / unit, omega_c, height, float(np.abs(orbit.multipliers).max())
+            landings=int(count),
+            period=orbit.period / unit,
+            omega_c=State.of(orbit.mean).omega_c / p.omega_0,
+            height=float(orbit.cycle.y.max()) / p.R,
+            multiplier=float(np.abs(orbit.multipliers).max()),
         )
     lasts = max(CONFIRMING / p.c, 4 * SEEN * unit)
     run = simulate(p, seen.x[-1], lasts, sample_interval=lasts / SEEN_SAMPLES)
-    last = run.time > run.time[-1] * 2 / 3
-    times = run.events.time[landings(zip(run.events.from_case, run.events.to_case, strict=True))]
-    times = times[times > run.time[-1] * 2 / 3]
-    if len(times) < 3 or run.time[-1] - times[-1] > 3 * np.max(np.diff(times)):
+    from_then_on = run.time[-1] * 2 / 3
+    last, times = run.time > from_then_on, run.events.time[_lands(run)]
+    times = times[times > from_then_on]
+    apart = np.diff(times)
+    if len(times) < 3 or run.time[-1] - times[-1] > 3 * np.max(apart):
         return None
-    between, omega_c = float(np.mean(np.diff(times))), float(np.mean(run.omega_c[last]))
-    return Hopping(0, between / unit, omega_c / p.omega_0, float(run.y[last].max()) / p.R)
+    omega_c, height = np.mean(run.omega_c[last]) / p.omega_0, run.y[last].max() / p.R
+    return Hopping(0, float(np.mean(apart)) / unit, float(omega_c), float(height))
+
+
+def _lands(run: Trajectory) -> npt.NDArray[np.bool_]:
+    """Which of its events are landings."""
+    return landings(zip(run.events.from_case, run.events.to_case, strict=True))
 
 
 def look(numbered: tuple[int, Array]) -> Row:
@@ -177,9 +185,8 @@ def look(numbered: tuple[int, Array]) -> Row:
 
 def share(hits: int, of: int) -> str:
     """In per cent, with the 95 % interval."""
-    return "{:.2f} ({:.2f} … {:.2f})".format(
-        *(100 * each for each in (hits / of, *interval(hits, of)))
-    )
+    least, most = interval(hits, of)
+    return f"{100 * hits / of:.2f} ({100 * least:.2f} … {100 * most:.2f})"
 
 
 def page(sets: int, rows: Sequence[Row], note: str = "") -> str:
@@ -210,11 +217,8 @@ hopped after 60/c; in all others every ball stopped landing.
 
 def draw(sets: int, rows: Sequence[Row]) -> Figure:
     """Sets with hopping over pairs of groups, on the share of sets that have it."""
-    figure = style.figure(10.5, 3.5)
-    tried, symbols = (
-        dict(zip(BOX, points(sets).T, strict=True)),
-        style.SYMBOLS | {"Omega_0": style.FREE_0},
-    )
+    figure, tried = style.figure(10.5, 3.5), dict(zip(BOX, points(sets).T, strict=True))
+    symbols = style.SYMBOLS | {"Omega_0": style.FREE_0}
     pairs = ("mu", "eta"), ("kappa", "Omega_0"), ("j", "Omega_0")
     for axes, (a, b) in zip(figure.subplots(1, len(pairs)), pairs, strict=True):
         edges = [_edges(a, 8), _edges(b, 8)]

@@ -17,15 +17,7 @@ from matplotlib.figure import Figure
 
 from compare.campaign.campaign import Campaign
 from compare.campaign.tasks import Task, carry_out
-from compare.engines.study import (
-    DEFAULTS,
-    EVENT,
-    MOREAU,
-    MUJOCO,
-    PLAIN,
-    AnySettings,
-    plain,
-)
+from compare.engines.study import DEFAULTS, EVENT, MOREAU, MUJOCO, PLAIN, AnySettings, plain
 from compare.figures import drawing, style
 from compare.figures.pages import Rows
 from docs.studies.states import (
@@ -99,11 +91,9 @@ class Contestant:
         task = self.task(APPROACH.run)
         half, file = replace(task, t_end=task.t_end / 2), kept / f"{task.key}.cost.json"
         if not file.exists():
-            took = [
-                [processor_time(partial(carry_out, each)) for each in (task, half)]
-                for _ in range(REPEATS)
-            ]
-            second = statistics.median(whole - first for whole, first in took)
+            runs = [partial(carry_out, each) for each in (task, half)]
+            timed = ([processor_time(run) for run in runs] for _ in range(REPEATS))
+            second = statistics.median(whole - first for whole, first in timed)
             write_text(file, json.dumps(second / half.t_end))
         return float(json.loads(file.read_text("utf-8")))
 
@@ -142,13 +132,10 @@ def ablation(campaign: Campaign) -> Rows:
     campaign.complete(each.task(of.run) for each in those for of in TRIED)
     errors = {each.name: each.errors(campaign) for each in those}
     drawing.save(draw_ladder(errors), PICTURES / "ladder.svg")
-    return [
-        ["settings", *(of.name for of in TRIED), "open"],
-        *(
-            [each.name, *map(number, errors[each.name]), f"{each.open(campaign):.0%}"]
-            for each in those
-        ),
-    ]
+    rows = [["settings", *(of.name for of in TRIED), "open"]]
+    for each in those:
+        rows.append([each.name, *map(number, errors[each.name]), f"{each.open(campaign):.0%}"])
+    return rows
 
 
 def frontier(campaign: Campaign) -> Rows:
@@ -203,15 +190,10 @@ def landings() -> Rows:
             run.y[(run.time > landed + 2e-3) & (run.time < landed + 0.1)].max()
             for run in (lands, *others)
         )
-        rows.append(
-            [
-                each.name,
-                number(abs(after / float(LANDING.at(landed + 5e-3)) - 1)),
-                f"{1e3 * height:.2g} mm" if height > 1e-5 else "none",
-                number(LANDING.error(lands)),
-                number(HITTING.error(hits)),
-            ]
-        )
+        error = abs(after / float(LANDING.at(landed + 5e-3)) - 1)
+        rebound = f"{1e3 * height:.2g} mm" if height > 1e-5 else "none"
+        errors = number(LANDING.error(lands)), number(HITTING.error(hits))
+        rows.append([each.name, number(error), rebound, *errors])
     return rows
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import itertools
 import os
-import statistics
 import subprocess
 import sys
 import tempfile
@@ -45,7 +44,6 @@ BEST = 1e-13
 """The tolerance of the run that others are held against."""
 RIVALS = LSODA, DOP853
 """Fast integrators of scipy."""
-PROGRAM = [sys.executable, "-m", "compare"]
 P = Parameters.named("reference")
 SLIPPING = P.replace(omega_0=25.0)
 """Slipping at both points: both contacts closed, and friction on its cone."""
@@ -115,11 +113,8 @@ def many() -> Rows:
         "simulate_many, one thread": partial(at_once, "event"),
         "simulate_many, one thread, time stepping": partial(at_once, "time-stepping"),
     }
-    took = {name: 1e3 * quickest(way) / RUNS for name, way in ways.items()}
-    return [
-        [f"{RUNS} random runs of 5 s", "a run, ms"],
-        *([name, f"{each:.2f}"] for name, each in took.items()),
-    ]
+    took = ([name, f"{1e3 * quickest(way) / RUNS:.2f}"] for name, way in ways.items())
+    return [[f"{RUNS} random runs of 5 s", "a run, ms"], *took]
 
 
 def costs() -> Rows:
@@ -134,13 +129,13 @@ def costs() -> Rows:
     def on_threads(number: int) -> float:
         return seconds(partial(mjsim.simulate_many, *given, sample_interval=0.2, threads=number))
 
-    for name, taken in (
-        (f"simulate_many of {count}: two threads against one", on_threads),
-        ("campaign: two processes against one", _campaign),
-    ):
+    for name, taken in {
+        f"simulate_many of {count}: two threads against one": on_threads,
+        "campaign: two processes against one": _campaign,
+    }.items():
         ratio, limit = two_against_one(taken)
-        rows += [[name, "", "", f"{ratio:.2f}"]]
-        rows += [["the same of bare arithmetic: the machine's limit", "", "", f"{limit:.2f}"]]
+        rows.append([name, "", "", f"{ratio:.2f}"])
+        rows.append(["the same of bare arithmetic: the machine's limit", "", "", f"{limit:.2f}"])
     return rows
 
 
@@ -168,43 +163,41 @@ def two_against_one(taken: Callable[[int], float]) -> tuple[float, float]:
 
 def start_up() -> Rows:
     """Processor time until commands have answered, beside that of importing MuJoCo."""
-    asked = {
-        f"import {name}": [sys.executable, "-c", f"import {name}"] for name in ("mujoco", "mjsim")
-    }
+    asked = {f"import {name}": ["-c", f"import {name}"] for name in ("mujoco", "mjsim")}
     for words in ("--version", "--help", "predict", "cases"):
-        asked[f"dualball {words}"] = [*PROGRAM, words]
+        asked[f"dualball {words}"] = ["-m", "compare", words]
     took = {name: min(_spent(words)[0] for _ in range(REPEATS)) for name, words in asked.items()}
-    first = took["import mujoco"]
-    return [
-        ["", "processor time", "by import mujoco"],
-        *([name, f"{own:.2f} s", f"{own / first:.2f}"] for name, own in took.items()),
-    ]
+    rows = [["", "processor time", "by import mujoco"]]
+    for name, own in took.items():
+        rows.append([name, f"{own:.2f} s", f"{own / took['import mujoco']:.2f}"])
+    return rows
 
 
 def growth() -> Rows:
     """What a run of 0.1 s takes in sweeps of more and more of them, of which only means are
     stored."""
-    rows = [
-        ["runs", "sweep: ms a run", "memory, MB", "kB a run", "collect: ms a run", "memory, MB"]
-    ]
+    head = ["runs", "sweep: ms a run", "memory, MB", "kB a run"]
+    rows = [[*head, "collect: ms a run", "memory, MB"]]
     for count in (1000, 10_000):
         with tempfile.TemporaryDirectory() as directory:
             runs = Path(directory) / "runs"
             sweep = f"sweep --vary omega_0=5:45:{count} --time 0.1 --means-only -o {runs}"
             collect = f"collect {runs} -o {runs}.h5"
             (swept, held), (gathered, kept) = (
-                _spent([*PROGRAM, *line.split(), "--workers", "0"]) for line in (sweep, collect)
+                _spent(["-m", "compare", *line.split(), "--workers", "0"])
+                for line in (sweep, collect)
             )
             size = sum(file.stat().st_size for file in runs.iterdir())
-        cells = 1e3 * swept, held, size / 1e3, 1e3 * gathered, kept
-        per_run = (1 / count, 1, 1 / count, 1 / count, 1)
-        rows.append([str(count), *(f"{x * y:.3g}" for x, y in zip(cells, per_run, strict=True))])
+        cells = 1e3 * swept / count, held, size / 1e3 / count, 1e3 * gathered / count, kept
+        rows.append([str(count), *(f"{x:.3g}" for x in cells)])
     return rows
 
 
 def _spent(words: list[str]) -> tuple[float, float]:
-    """Processor time of a program and its workers, s, and its largest memory, MB."""
-    process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    """Processor time of a Python and its workers, s, and its largest memory, MB."""
+    process = subprocess.Popen(
+        [sys.executable, *words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
     _, status, usage = os.wait4(process.pid, 0)
     if status:
         sys.exit(f"ends with {os.waitstatus_to_exitcode(status)}: {' '.join(words)}")
@@ -227,20 +220,12 @@ def cost(runs: int, steps: int = 2500) -> list[float]:
     start = p, state.x, steps * settings.timestep, None, settings
     bare, whole = [_bare(settled, runs, steps)], []
     for _ in range(REPEATS):
-        loops = itertools.chain(
-            *(Run(*start, sample_interval=100 * settings.timestep) for _ in range(runs))
-        )
-        whole.append(processor_time(partial(list, loops)))
+        runs_of_it = [Run(*start, sample_interval=100 * settings.timestep) for _ in range(runs)]
+        whole.append(processor_time(partial(list, itertools.chain(*runs_of_it))))
         bare.append(_bare(settled, runs, steps))
-    ratios = [
-        2 * w / (before + after) for w, before, after in zip(whole, bare, bare[1:], strict=False)
-    ]
+    ratios = 2 * np.array(whole) / (np.array(bare[:-1]) + bare[1:])
     each = steps * runs
-    return [
-        statistics.median(bare) / each,
-        statistics.median(whole) / each,
-        statistics.median(ratios),
-    ]
+    return [float(np.median(bare)) / each, float(np.median(whole)) / each, float(np.median(ratios))]
 
 
 def _bare(settled: JointedBall, runs: int, steps: int) -> float:

@@ -45,27 +45,24 @@ def main() -> int:
     args = parser.parse_args()
     try:
         first, *others = args.directories
-        levels = [
-            trial.judged(first, args.workers, args.whole),
-            *(trial.judged(each, args.workers) for each in others),
-        ]
-        measured = trial.wrong_engines(first, args.workers) if args.engines else []
-        named = [name.partition("=") for name in args.alone]
-        alone = [
-            trial.judged(Path(where or first), args.workers, by=name) for name, _, where in named
-        ]
+        levels = trial.judged(first, args.workers, args.whole)
+        for each in others:
+            levels |= trial.judged(each, args.workers)
+        engines = trial.wrong_engines(first, args.workers) if args.engines else []
+        alone = dict[str, list[trial.Trial]]()
+        for name, _, where in (each.partition("=") for each in args.alone):
+            alone |= trial.judged(Path(where or first), args.workers, by=name)
         if args.page:
-            mutants.write(args.page, levels, measured, alone)
+            mutants.write(args.page, levels | alone, engines)
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
-    trials = [*(trial for level in levels for trial in level.trials if trial.tried), *measured]
+    trials = [each for own in (*levels.values(), engines) for each in own if each.tried]
     missed, count = [each for each in trials if each.kind != "by_numbers"], len(trials)
     hanging = sum(bool(each.hung) for each in trials)
     print(
-        f"{count - len(missed)} of {count} faults were noticed by numbers; with {hanging} of "
-        "them the "
-        f"predictions of a claim hang"
+        f"{count - len(missed)} of {count} faults were noticed by numbers; with {hanging} of them "
+        "the predictions of a claim hang"
     )
     for each in missed:
         print(f"not noticed by numbers: {each.what}: {each.by}")

@@ -12,7 +12,7 @@ import json
 import math
 import pkgutil
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -53,38 +53,22 @@ UNCHANGED = 1e-9
 """Part of its natural size by which a prediction may move for a fault to have changed nothing: a
 fault in the first guess of an iteration leaves round-off. (It was a part of the prediction, until
 two such faults of seed 20261217 had counted as missed: a prediction of 0 had moved by 1e-16.)"""
-Sets = Mapping[str, Parameters]
+BY = (MUJOCO, PLAIN)
 
 
-@dataclass(frozen=True)
-class Plan:
-    """How much a round is."""
-
-    sets: int = 1
-    theories: int = 20
-    engines: int = 3
-    protocols: Sequence[str] = ()
-    """All of the quick level for none."""
-    by: Sequence[Engine] = (MUJOCO, PLAIN)
-
-
-def drawn(rng: np.random.Generator, count: int) -> dict[str, Parameters]:
-    """Sets drawn evenly from the box of the study's design, by name."""
-    found = {}
-    for k in range(count):
-        values = {name: float(rng.uniform(LOW[name], HIGH[name])) for name in LOW}
-        ratio, kappa = values.pop("r/R"), values.pop("kappa")
-        c = kappa * math.sqrt(values["g"] / values["R"])
-        more: dict[str, Any] = values | {"r": ratio * values["R"], "c": c, "omega_0": 1.0}
-        found[f"blind-{k + 1}"] = Parameters(**more)
-    return found
+def drawn(rng: np.random.Generator) -> Parameters:
+    """A set drawn evenly from the box of the study's design."""
+    values: dict[str, Any] = {name: float(rng.uniform(LOW[name], HIGH[name])) for name in LOW}
+    ratio, kappa = values.pop("r/R"), values.pop("kappa")
+    c = kappa * math.sqrt(values["g"] / values["R"])
+    return Parameters(**values, r=ratio * values["R"], c=c, omega_0=1.0)
 
 
 def measured(
-    directory: Path, engines: Sequence[Engine], sets: Sets, protocols: Sequence[str]
+    directory: Path, engines: Sequence[Engine], p: Parameters, protocols: Collection[str]
 ) -> RecordsByEngine:
-    """What engines measure on sets."""
-    study = validation.plan(directory, Level.QUICK, None, sets, None)
+    """What engines measure on a set, by all protocols of the quick level if none is named."""
+    study = validation.plan(directory, Level.QUICK, None, {"blind-1": p}, None)
     chosen = [each for each in study.protocols if not protocols or each.name in protocols]
     study = replace(study, engines=list(engines), protocols=chosen)
     with Campaign(directory / RUNS, 0, passing=True) as campaign:
@@ -174,11 +158,11 @@ def tried(wrong: WrongTheory, said: Sequence[Said], records: RecordsByEngine) ->
     return detection
 
 
-def tried_engine(wrong: Engine, said: Sequence[Said], directory: Path, sets: Sets) -> Detection:
+def tried_engine(wrong: Engine, said: Sequence[Said], directory: Path, p: Parameters) -> Detection:
     """Measure with a wrong engine, and judge by the right theory."""
     ENGINES[wrong.name] = wrong  # tasks name it
     detection = Detection(changes=True)
-    records = measured(directory, [wrong], sets, sorted(PROVING))
+    records = measured(directory, [wrong], p, PROVING)
     own = {MUJOCO.name: records[wrong.name]}
     forget()
     for each in (each for each in said if each.verdict.claim.protocols <= PROVING):
@@ -186,83 +170,94 @@ def tried_engine(wrong: Engine, said: Sequence[Said], directory: Path, sets: Set
     return detection
 
 
-def play(seed: int, directory: Path, plan: Plan = Plan()) -> str:
-    """Play a round in a directory; the section about it, in Markdown."""
+def play(
+    seed: int,
+    directory: Path,
+    *,
+    theories: int = 20,
+    engines: int = 3,
+    protocols: Collection[str] = (),
+) -> str:
+    """Play a round in a directory, with so many wrong theories and engines; the section about it,
+    in Markdown."""
     rng = np.random.default_rng(seed)
-    sets = drawn(rng, plan.sets)
+    p = drawn(rng)
     make_directory(directory)
-    there = [*plan.by, *(ENGINES[name] for name in ASKED if not ENGINES[name].missing)]
-    records = measured(directory / "measured", there, sets, plan.protocols)
+    there = [*BY, *(ENGINES[name] for name in ASKED if not ENGINES[name].missing)]
+    records = measured(directory / "measured", there, p, protocols)
     rows = [m for steps in records.values() for own in steps.values() for m in own.measurements]
     names = {m.protocol for m in rows}
-    claims = [claim for claim in CLAIMS if claim.protocols <= names]
-    said = [watched(partial(full_verdict, claim, records)) for claim in claims]
+    said = [
+        watched(partial(full_verdict, claim, records))
+        for claim in CLAIMS
+        if claim.protocols <= names
+    ]
     planted = formulas.planted(rng, formulas_called(said))
-    wrongs = [next(planted) for _ in range(plan.theories)]
-    balls = [formulas.of_ball(rng) for _ in range(plan.engines)]
+    wrongs = [next(planted) for _ in range(theories)]
+    balls = [formulas.of_ball(rng) for _ in range(engines)]
     key = [*(each.what for each in wrongs), *(what for what, _ in balls)]
     write_text(directory / KEY, json.dumps(key, ensure_ascii=False, indent=1))
-    detections, first = [tried(wrong, said, records) for wrong in wrongs], dict([*sets.items()][:1])
+    detections = [tried(wrong, said, records) for wrong in wrongs]
     for n, (_, ball) in enumerate(balls):
         wrong = wrong_engine(f"blind-engine-{n}", ball)
-        detections.append(tried_engine(wrong, said, directory / wrong.name, first))
-    return section(seed, json.loads((directory / KEY).read_text("utf-8")), sets, said, detections)
+        detections.append(tried_engine(wrong, said, directory / wrong.name, p))
+    return section(seed, p, said, list(zip(key, detections, strict=True)))
 
 
 def section(
-    seed: int, key: Sequence[str], sets: Sets, said: Sequence[Said], detections: Sequence[Detection]
+    seed: int,
+    p: Parameters,
+    said: Sequence[Said],
+    faults: Sequence[tuple[str, Detection]],
 ) -> str:
     """What came out, once the key is opened."""
     off = {row.engine: row for row in distribution([e.verdict for e in said]) if not row.quantity}
     names = list(dict.fromkeys(name for each in said for name in each.engines))
     head = ["engine", "found", "confirmed", "false alarms", "numbers", "beyond 1", "beyond 2", "3"]
-    counts, faults = [head], [["fault", *names, ""]]
+    counts, found = [head], [["fault", *names, ""]]
     for name in names:
         own = [(e.verdict.claim, e.engines[name].outcome) for e in said if name in e.engines]
         alarms = [c.id for c, o in own if o is Outcome.REFUTED is not c.expected]
         confirmed = sum(outcome is Outcome.CONFIRMED for _, outcome in own)
-        row = [name, str(sum(name in each.by for each in detections)), f"{confirmed} of {len(own)}"]
+        row = [name, str(sum(name in each.by for _, each in faults)), f"{confirmed} of {len(own)}"]
         beyond = [f"{off[name].beyond(n):.1%}" if name in off else "–" for n in (1, 2, 3)]
         numbers = str(len(off[name].sizes)) if name in off else "0"
         counts.append([*row, ", ".join(alarms) or "none", numbers, *beyond])
-    for what, detection in zip(key, detections, strict=True):
-        notes = ["changes no prediction"] * (not detection.changes)
-        notes += ["breaks down"] * detection.broke
+    for what, each in faults:
+        notes = ["changes no prediction"] * (not each.changes) + ["breaks down"] * each.broke
         shown = "`" + what.replace("|", "\\|") + "`"
-        faults.append([shown, *(detection.by.get(name, "–") for name in names), ", ".join(notes)])
+        found.append([shown, *(each.by.get(name, "–") for name in names), ", ".join(notes)])
     absent = ", ".join(name for name in ASKED if name not in names)
-    live = sum(each.changes for each in detections)
-    found = sum(bool(each.by) for each in detections)
-    where = "; ".join(
-        ", ".join(f"{n} = {getattr(p, n):.4g}" for n in ("mu", "eta", "j", "r", "R", "m", "g", "c"))
-        for p in sets.values()
-    )
+    live = sum(each.changes for _, each in faults)
+    values = (f"{n} = {getattr(p, n):.4g}" for n in ("mu", "eta", "j", "r", "R", "m", "g", "c"))
     return f"""
 ## Seed {seed}
 
-Found: **{found} of the {live} faults that change a prediction or a measurement**, of {len(key)}
+Found: **{sum(bool(each.by) for _, each in faults)} of the {live} faults that change a prediction \
+or a measurement**, of {len(faults)}
 that were planted. Rules as
-of the commit `{current_commit()[:12] or "unknown"}`. Sets, SI: `{where}`.
+of the commit `{current_commit()[:12] or "unknown"}`. Set, SI: `{", ".join(values)}`.
 Measured by {", ".join(names)}; not installed: {absent or "none"}.
 
 {pages.markdown(counts)}
 
-{pages.markdown(faults)}
+{pages.markdown(found)}
 """
 
 
 def rounds(page: str) -> Rows:
     """What became of the faults of all rounds on the page, by MuJoCo under the law."""
-    table = [["seed", "faults that change something", "found", "break down", "go unseen"]]
+    counts = {}
     for one in page.split("\n## Seed ")[1:]:
         faults = [row.split(" | ") for row in one.splitlines() if row.startswith("| `")]
         live = [row for row in faults if "changes no prediction" not in row[-1]]
-        found = sum(row[1] != "–" for row in live)
-        broke = sum(row[1] == "–" and "breaks down" in row[-1] for row in live)
-        table.append([one.split("\n")[0], *map(str, (len(live), found, broke)), ""])
-        table[-1][-1] = str(len(live) - found - broke)
-    sums = [str(sum(int(row[k]) for row in table[1:])) for k in range(1, 5)]
-    return [*table, ["all", *sums]]
+        unseen = [row for row in live if row[1] == "–"]
+        broke = sum("breaks down" in row[-1] for row in unseen)
+        seed, found = one.split("\n")[0], len(live) - len(unseen)
+        counts[seed] = np.array([len(live), found, broke, len(unseen) - broke])
+    counts["all"] = np.sum(list(counts.values()), axis=0)
+    head = ["seed", "faults that change something", "found", "break down", "go unseen"]
+    return [head, *([seed, *map(str, own)] for seed, own in counts.items())]
 
 
 def main(seed: str, directory: str = "results/blind") -> None:

@@ -81,8 +81,8 @@ def test_a_wrong_engine_moves_otherwise_and_does_not_say_so(wrong, tmp_path, mon
 
 def test_the_list_has_a_row_for_each_fault_and_names_tests_that_there_are(tmp_path):
     trials = [trial.Trial(wrong.what, {"prop-1": Outcome.REFUTED}) for wrong in THEORIES]
-    judged = trial.Judged("quick", [*trials[1:], trial.Trial("nobody's", {})], tmp_path)
-    mutants.write(tmp_path / "page.md", [judged], [trial.Trial("crooked", {})])
+    tried = {"quick": [*trials[1:], trial.Trial("nobody's", {})]}
+    mutants.write(tmp_path / "page.md", tried, [trial.Trial("crooked", {})])
     page = (tmp_path / "page.md").read_text("utf-8")
     assert f"| theories, by quick | {len(THEORIES)} | {len(THEORIES) - 1} | 0 | 0 | 1 |" in page
     assert "| engines, measured anew | 1 | 0 | 0 | 0 | 1 |" in page
@@ -126,8 +126,8 @@ def test_a_round_is_played_by_a_seed(tmp_path, monkeypatch):
     )
     monkeypatch.setitem(ENGINES, "siconos", there)
     monkeypatch.setitem(ENGINES, "drake", absent)
-    plan = blind.Plan(sets=1, theories=3, engines=0, protocols=("field",), by=(MUJOCO,))
-    said = blind.play(1, tmp_path, plan)
+    monkeypatch.setattr(blind, "BY", (MUJOCO,))
+    said = blind.play(1, tmp_path, theories=3, engines=0, protocols=("field",))
     key = json.loads((tmp_path / blind.KEY).read_text("utf-8"))
     assert len(key) == 3
     assert all(f"| `{what}` | " in said for what in key)

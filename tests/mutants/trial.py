@@ -6,17 +6,16 @@ go unnoticed than may."""
 
 from __future__ import annotations
 
-import functools
 import sys
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from compare import validation
 from compare.campaign.workers import LateError, at_most, processes
 from compare.engines.study import ENGINES
-from compare.method.record import Records
 from compare.plan import Level
 from compare.report import results
 from compare.subjects.catalogue import CLAIMS
@@ -68,45 +67,27 @@ class Trial:
         return ", ".join([*named, *(f"{name} hangs" for name in self.hung)])
 
 
-@dataclass(frozen=True)
-class Judged:
-    """What the measurements of a results directory notice."""
-
-    name: str
-    """Of the level, and of the engine that judges alone if it isn't the engine on trial."""
-    trials: Sequence[Trial]
-    """Of all wrong theories."""
-    directory: Path
-    whole: bool = True
-    """Whether by all claims, or by the quickest ones first and only until one notices."""
-
-
-def measured(directory: Path) -> Records:
-    """What the engine on trial measured."""
-    (steps, *_) = validation.stored(directory).values()
-    return steps[1]
-
-
-def judged(directory: Path, workers: int = 2, whole: bool = False, by: str = "") -> Judged:
-    """Every wrong theory judged on the measurements stored in a results directory, or on what a
-    engine alone says.
+def judged(
+    directory: Path, workers: int = 2, whole: bool = False, by: str = ""
+) -> dict[str, list[Trial]]:
+    """Every wrong theory judged on the measurements stored in a results directory, or on what an
+    engine alone says; by the name of the level, and of that engine.
 
     By the claims that call its function, the quickest first and only until one notices it; if
     `whole`, by all of them."""
     level = results.load(directory).level.lower()
     with processes(workers) as work:
-        right = list(work.map(functools.partial(_right, directory, by), range(len(CLAIMS))))
-        trials = _shown(
-            work.map(functools.partial(_theory, directory, by, whole, right), range(len(THEORIES)))
-        )
-    return Judged(f"{level}, by {by}" if by else level, trials, directory, whole)
+        right = list(work.map(partial(_right, directory, by), range(len(CLAIMS))))
+        theory = partial(_theory, directory, by, whole, right)
+        trials = _shown(work.map(theory, range(len(THEORIES))))
+    return {f"{level}, by {by}" if by else level: trials}
 
 
 def wrong_engines(directory: Path, workers: int = 2) -> list[Trial]:
     """Every wrong engine, measured anew by the protocols of `PROVING`; runs are kept, each engine's
     apart."""
     with processes(workers) as work:
-        return _shown(work.map(functools.partial(_engine, directory), range(len(WRONG_ENGINES))))
+        return _shown(work.map(partial(_engine, directory), range(len(WRONG_ENGINES))))
 
 
 def _shown(trials: Iterable[Trial]) -> list[Trial]:
@@ -149,7 +130,8 @@ def name_of(wrong: WrongTheory) -> str:
 def _outcome(directory: Path, by: str, claim: Claim) -> Outcome:
     """The verdict on a claim by an engine; by the engine on trial if it has no name."""
     if not by:
-        return verdict(claim, measured(directory)).outcome
+        (steps, *_) = validation.stored(directory).values()  # of the engine on trial
+        return verdict(claim, steps[1]).outcome
     said = full_verdict(claim, validation.stored(directory)).engines
     return {each.engine: each.outcome for each in said}[by]
 
