@@ -15,9 +15,8 @@ or wall."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from enum import Enum, StrEnum, auto
 from functools import partial
 from itertools import pairwise
 from typing import Unpack
@@ -27,7 +26,7 @@ import numpy as np
 from compare.campaign.tasks import Task
 from compare.engines.study import sliding_speeds
 from compare.method import settling
-from compare.method.brackets import Answer, Attempt, Bracket, Search, narrow
+from compare.method.brackets import Answer, Attempt, Bracket, Search
 from compare.method.conditions import Conditions
 from compare.method.protocol import Protocol
 from compare.method.record import Measured, Measurement, Missing, Records, Sets
@@ -42,6 +41,7 @@ from compare.method.statistics import (
     settled_case,
     tail,
 )
+from compare.method.together import Procedure, narrowed, settled, together
 from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
 
@@ -55,17 +55,15 @@ LAGS = 1e-3
 """Relative lag behind the fluid from which on a ball that has slipped may have to slip again."""
 CREEPS = 100.0
 """Slip, in that unit, at which a ball may creep to rest jammed between floor and wall."""
-
-
-class Passage(StrEnum):
-    """A flow up to which, or from which on, a ball moves in some case."""
-
-    RR_ENDS = "RR ends"
-    NS_ENDS = "NS ends"
-    SS_ENDS = "SS ends"
-    NR_BEGINS = "NR begins"
-    RR_RETURNS = "RR returns"
-    FOLD = "fold"
+COARSE = 1e-2  # relative width of a bracket where only the neighbourhood is wanted
+AWAY = 0.03
+"""Relative distance from a known end of rolling, where an engine beside looks for it."""
+# Relative distances of settled states from where something vanishes; from where a ball rides the
+# wall as slowly as it can; and below a fold, in parts of the range of slipping: slip goes like the
+# root.
+DISTANCES = np.array([0.005, 0.01, 0.02, 0.03, 0.05])
+DISTANCES_OF_NR = np.array([0.002, 0.008, 0.02, 0.035, 0.05])
+DISTANCES_BELOW_FOLD = np.array([0.01, 0.02, 0.035, 0.05, 0.08, 0.11, 0.15])
 
 
 def lifts(end: Bracket) -> bool:
@@ -143,83 +141,96 @@ def settles(run: Trajectory, slowed: float = 0.2) -> bool | None:
     return False if slowing > 1 else True if slowing < slowed else None
 
 
-ASKED: dict[Passage, tuple[float, Answer]] = {
-    Passage.RR_ENDS: (5, stays_rolling),
-    Passage.NS_ENDS: (20, lambda run: physical_case(settled_case(run)) is not Case.NR),
-    Passage.SS_ENDS: (10, may_settle),
-    Passage.NR_BEGINS: (5, lambda run: slip(sliding_speeds(run)[1], run) > 1),
-    Passage.RR_RETURNS: (20, lambda run: presses(run) and settled_case(run) is Case.RR),
-    Passage.FOLD: (1.4, settles),
-}
-"""How long a run takes, in units of 1/c, and what is asked of it: yes below a threshold, no above.
+@dataclass(frozen=True)
+class Passage:
+    """A flow up to which, or from which on, a ball moves in some case."""
 
-The ball still rolls; the wall doesn't hold it; it settles on the floor, or may; it begins to slip
-on the wall; pressed to the floor it rolls on both again; it settles on the floor."""
-
-
-COARSE = 1e-2
-"""Relative width of a bracket where only the neighbourhood is wanted."""
-AWAY = 0.03
-"""Relative distance from a known end of rolling, where an engine beside looks for it."""
-DISTANCES = np.array([0.005, 0.01, 0.02, 0.03, 0.05])
-"""Relative distances of settled states from where something vanishes."""
-DISTANCES_BELOW_FOLD = np.array([0.01, 0.02, 0.035, 0.05, 0.08, 0.11, 0.15])
-"""The same below a fold, in parts of the range of slipping: slip goes like the root."""
-DISTANCES_OF_NR = np.array([0.002, 0.008, 0.02, 0.035, 0.05])
-"""The same from where a ball rides the wall as slowly as it can."""
+    name: str
+    time: float
+    """How long a run takes in which that is asked, in units of 1/c."""
+    answer: Answer
+    """Yes below the flow, no above."""
+    start: str = ""
+    """How balls start of which is asked when that ends."""
+    thresholds: tuple[str, ...] = ()
+    """Those that it may be."""
 
 
-FOUND = {
-    Passage.RR_ENDS: ("omega_01", "omega_03"),
-    Passage.NS_ENDS: ("omega_02",),
-    Passage.SS_ENDS: ("omega_04",),
-}
-"""The thresholds that each limit may be."""
-STARTS = {
-    Passage.RR_ENDS: "with the fluid",
-    Passage.NS_ENDS: "on the wall",
-    Passage.SS_ENDS: "rest",
-}
-"""How balls start of which is asked when that ends."""
+# The ball still rolls; the wall doesn't hold it; it settles on the floor, or may.
+RR_ENDS = Passage("RR ends", 5, stays_rolling, "with the fluid", ("omega_01", "omega_03"))
+NS_ENDS = Passage(
+    "NS ends",
+    20,
+    lambda run: physical_case(settled_case(run)) is not Case.NR,
+    "on the wall",
+    ("omega_02",),
+)
+SS_ENDS = Passage("SS ends", 10, may_settle, "rest", ("omega_04",))
+ENDS = RR_ENDS, NS_ENDS, SS_ENDS
+# It begins to slip on the wall; pressed to the floor it rolls on both again; it settles there.
+NR_BEGINS = Passage("NR begins", 5, lambda run: slip(sliding_speeds(run)[1], run) > 1)
+RR_RETURNS = Passage("RR returns", 20, lambda run: presses(run) and settled_case(run) is Case.RR)
+FOLD = Passage("fold", 1.4, settles)
 From = Callable[[Parameters], Array]
 """The state in which a ball starts, by its parameters."""
 
 
-class Beside(Enum):
-    """Settled states beside a limit, from which it is extrapolated or searched for."""
-
-    NR = auto()
-    NS = auto()
-    LIFTED = auto()
-    """NR beyond the end of RR."""
-    SS = auto()
-    """SS next to the end of RR."""
-    SS_LAST = auto()
-    """SS next to its own end."""
-
-    @property
-    def case(self) -> Case:
-        """The case in which they settle."""
-        return {Beside.NS: Case.NS, Beside.SS: Case.SS, Beside.SS_LAST: Case.SS}.get(self, Case.NR)
-
-
 def measure(runner: Runner, sets: Sets, records: Records) -> Measured:
     """The thresholds of each set: bisected, and extrapolated from settled states."""
-    sure = not runner.sampling.granted
-    found = [_where_cases_change(runner, name, p, records) for name, p in sets.items()]
-    _narrow(runner, found, _end_of_rolling, careful=sure)
-    _narrow(runner, found, _sinking_and_slipping)
-    _settle_beside(runner, found)
-    _narrow(runner, found, _on_the_wall_and_back, careful=sure)
-    _narrow(runner, found, _fold)
-    for each in found:
-        for kind, bracket in each.brackets.items():
-            if bracket.failure and kind is not Passage.NS_ENDS:  # which is looked for roughly
-                yield each.missing(
-                    f"{kind}: its flow is known less well, as a run {bracket.failure}", 0
-                )
-        yield from _rows(each)
-        yield from _rows_of_slipping(each)
+    return together(runner, (_of_set(runner, name, p, records) for name, p in sets.items()))
+
+
+def _of_set(runner: Runner, name: str, p: Parameters, records: Records) -> Procedure[None]:
+    """The thresholds of a set."""
+    sampling, each = runner.sampling, Findings(runner, name, p)
+    sure, width = not sampling.granted, sampling.thresholds_width
+    cases, changes = _where_cases_change(runner, name, records)
+    # The largest flow at which a ball that rolls at both points goes on so.
+    if rolling := changes.get(RR_ENDS):
+        yield from each.narrow(sure, each.search(RR_ENDS, rolling, width * rolling.high))
+    end = each.brackets.get(RR_ENDS)
+    # Roughly, up to where the wall holds no ball, and SS settles on the floor.
+    rough = []
+    if sinking := changes.get(NS_ENDS):
+        rough.append(each.search(NS_ENDS, sinking, COARSE * sinking.low))
+    slipping = changes.get(SS_ENDS)
+    if slipping and end and not lifts(end) and end.high < slipping.high:
+        slipping = replace(slipping, low=max(slipping.low, end.high))
+        rough.append(each.search(SS_ENDS, slipping, COARSE * slipping.low))
+    yield from each.narrow(False, *rough)
+    # A bracket counts only if something was seen beyond it, or that is granted.
+    for kind, bracket in [*each.brackets.items()]:
+        if not (bracket.runs[1] or bracket.high in cases[kind] or sampling.granted):
+            del each.brackets[kind]
+    yield from _settle_beside(each)
+    # Where slip begins on the wall, and where a ball that is pressed on the floor, with a bit less
+    # spin, rolls again: from settled states continued.
+    begun = []
+    begins, carried = each.brackets.get(NS_ENDS), each.states.get("NR", [])
+    if begins and len(carried) == len(DISTANCES_OF_NR):
+        start = continued(carried, height=settling.safe_height(p))
+        begun.append(each.search(NR_BEGINS, begins, width * begins.high, start))
+    end, lifted = each.brackets.get(RR_ENDS), each.states.get("lifted", [])
+    if end and len(lifted) == len(DISTANCES_OF_NR):
+        change = Bracket(end.low * (1 - COARSE), end.high * (1 + COARSE))
+        pressed = continued(lifted, height=0.0, less=1e-3)
+        begun.append(each.search(RR_RETURNS, change, width * end.high, pressed))
+    yield from each.narrow(sure, *begun)
+    # The largest flow at which a ball on the floor settles. At a fold all slows down, like the root
+    # of the distance.
+    top, smooth = _end_of_slipping(each)
+    if top and sampling.slow:
+        narrowest, nearest = sampling.thresholds_fold, each.states["last SS"][0].mean
+        change = around(top.value, max(narrowest, 5.0 * top.uncertainty / top.value))
+        time = 1 / math.sqrt(narrowest)
+        fold = each.search(FOLD, change, narrowest * top.value, lambda _: nearest, time)
+        yield from each.narrow(False, fold)
+    for kind, bracket in each.brackets.items():
+        if bracket.failure and kind is not NS_ENDS:  # which is looked for roughly
+            why = f"{kind.name}: its flow is known less well, as a run {bracket.failure}"
+            yield each.missing(why, 0)
+    yield from _rows(each)
+    yield from _rows_of_slipping(each, cases[SS_ENDS], top, smooth)
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,13 +240,14 @@ class Findings:
     runner: Runner
     set: str
     p: Parameters
-    cases: Mapping[Passage, Mapping[float, Case]]
-    """In which cases balls that start so were seen to settle, by flow, the slowest first."""
-    changes: Mapping[Passage, Bracket]
-    """Flows between which a limit is looked for."""
     brackets: dict[Passage, Bracket] = field(default_factory=dict)
-    states: dict[Beside, list[SteadyState]] = field(default_factory=dict)
-    """The nearest first."""
+    states: dict[str, list[SteadyState]] = field(default_factory=dict)
+    """Settled states beside a limit, the nearest first, by which: see `_settle_beside`."""
+
+    def narrow(self, careful: bool, *searches: tuple[Passage, Search]) -> Procedure[None]:
+        """Narrow down what is searched for."""
+        brackets = yield from narrowed(*(search for _, search in searches), careful=careful)
+        self.brackets.update(zip((kind for kind, _ in searches), brackets, strict=True))
 
     def search(
         self,
@@ -245,22 +257,21 @@ class Findings:
         start: From | None = None,
         time: float = 1.0,
     ) -> tuple[Passage, Search]:
-        """A search by runs at held flows, `time` times as long as `ASKED` takes.
+        """A search by runs at held flows, `time` times as long as usual.
 
-        They start as `STARTS` says, unless another start is given; for the end of slipping, from
+        They start as the passage says, unless another start is given; for the end of slipping, from
         the state that the ball reached at the largest flow so far."""
-        units, answer = ASKED[kind]
 
         def task(omega: float, bracket: Bracket, attempt: Attempt) -> Task:
             q = self.p.replace(omega_0=float(omega))
-            if kind is Passage.SS_ENDS and (last := bracket.runs[0]):
+            if kind is SS_ENDS and (last := bracket.runs[0]):
                 x0 = last.x[-1]
             else:
-                x0 = start(q) if start else settling.initial_condition("", q, STARTS[kind]).x0
-            t_end = settling.rounded_duration(q, units * time * attempt.time)
+                x0 = start(q) if start else settling.initial_condition("", q, kind.start).x0
+            t_end = settling.rounded_duration(q, kind.time * time * attempt.time)
             return self.runner.task(q, x0, t_end, coarse_step(q) / attempt.divisor)
 
-        return kind, Search(around, task, answer, width)
+        return kind, Search(around, task, kind.answer, width)
 
     def bracket_seen(self, kind: Passage) -> Bracket | None:
         """A bracket both of whose ends were seen in runs."""
@@ -280,8 +291,7 @@ class Findings:
     ) -> Measurement | Missing:
         """The measurement of a threshold, or of a number; or why it wasn't found."""
         if at is None:
-            why = f"too few states settled for {quantity} by {how['by']}"
-            return self.missing(f"{why}, or their extrapolation has no zero")
+            return self.missing(f"too few states settled for {quantity} by {how['by']}, or no zero")
         p = self.p.replace(omega_0=at.value) if isinstance(at, Estimate) else self.p
         return self.runner.measurement(self.set, p, quantity, at, tasks, **how)
 
@@ -298,37 +308,39 @@ class Findings:
             unseen = max(of.width / max(1.0, speed), SLIP_SEEN * of.high)
         return self.row(quantity, of.place.also(unseen_slip=unseen), of.tasks, side=side, by=by)
 
-    def rows_of_zero(self, kind: Beside, what: str, quantity: str, side: str, by: str) -> Measured:
+    def rows_of_zero(self, which: str, what: str, quantity: str, side: str, by: str) -> Measured:
         """The measurement of a threshold, extrapolated from settled states to a zero."""
-        if kind in self.states:
-            states = self.states[kind]
+        if which in self.states:
+            states = self.states[which]
             place = extrapolated(states, what, extrapolated_zero)
             tasks = [state.task for state in states]
             yield self.row(quantity, place, tasks, side=side, by=f"{by} → 0")
 
 
-def _where_cases_change(runner: Runner, name: str, p: Parameters, records: Records) -> Findings:
-    """For each kind of change the flows of settled states between which the case changes.
+def _where_cases_change(
+    runner: Runner, name: str, records: Records
+) -> tuple[dict[Passage, dict[float, Case]], dict[Passage, Bracket]]:
+    """The cases to which balls settled, by flow, and the flows between which they change.
 
     Without such flows from half the slowest, or up to twice the fastest. An engine beside the one
     on trial looks where that one found something."""
-    starts = STARTS | {Passage.SS_ENDS: runner.sampling.settled_starts[0][0]}
-    cases = {kind: settling.settled_cases(records, name, how) for kind, how in starts.items()}
-    changes = {}
-    for kind, seen in cases.items():
+    starts = RR_ENDS.start, NS_ENDS.start, runner.sampling.settled_starts[0][0]
+    cases, changes = {}, {}
+    for kind, how in zip(ENDS, starts, strict=True):
+        seen = cases[kind] = settling.settled_cases(records, name, how)
         if flows := list(seen):
-            ended = {Case.NR} if kind is not Passage.RR_ENDS else set(Case) - {Case.RR}
+            ended = {Case.NR} if kind is not RR_ENDS else set(Case) - {Case.RR}
             low = max((flow for flow in flows if seen[flow] not in ended), default=flows[0] / 2)
             high = next((flow for flow in flows if flow > low), 2 * flows[-1])
             changes[kind] = Bracket(low, high)
     if any(m.set == name for m in records.select("thresholds")):
-        changes = {}
-        for kind, quantities in FOUND.items():
-            away = AWAY if kind is Passage.RR_ENDS else COARSE / 3
-            for known in (records.threshold(name, quantity) for quantity in quantities):
-                if known:
-                    changes[kind] = around(known.value, away)
-    return Findings(runner, name, p, cases, changes)
+        changes = {
+            kind: around(known.value, AWAY if kind is RR_ENDS else COARSE / 3)
+            for kind in ENDS
+            for quantity in kind.thresholds
+            if (known := records.threshold(name, quantity))
+        }
+    return cases, changes
 
 
 def around(flow: float, part: float) -> Bracket:
@@ -336,85 +348,28 @@ def around(flow: float, part: float) -> Bracket:
     return Bracket(flow * (1 - part), flow * (1 + part))
 
 
-def _narrow(
-    runner: Runner,
-    found: Sequence[Findings],
-    searches: Callable[[Findings], Iterator[tuple[Passage, Search]]],
-    careful: bool = False,
-) -> None:
-    """Narrow down what is searched for on a set, on all sets together."""
-    asked = [(each, kind, search) for each in found for kind, search in searches(each)]
-    brackets = narrow(runner, [search for *_, search in asked], careful)
-    for (each, kind, _), bracket in zip(asked, brackets, strict=True):
-        each.brackets[kind] = bracket
-
-
-def _end_of_rolling(each: Findings) -> Iterator[tuple[Passage, Search]]:
-    """A search for the largest flow at which a ball that rolls at both points goes on so."""
-    if change := each.changes.get(Passage.RR_ENDS):
-        width = each.runner.sampling.thresholds_width * change.high
-        yield each.search(Passage.RR_ENDS, change, width)
-
-
-def _sinking_and_slipping(each: Findings) -> Iterator[tuple[Passage, Search]]:
-    """Rough searches up to where the wall holds no ball, and SS settles on the floor."""
-    if change := each.changes.get(Passage.NS_ENDS):
-        yield each.search(Passage.NS_ENDS, change, COARSE * change.low)
-    change, end = each.changes.get(Passage.SS_ENDS), each.brackets.get(Passage.RR_ENDS)
-    if change and end and not lifts(end) and end.high < change.high:
-        change = replace(change, low=max(change.low, end.high))
-        yield each.search(Passage.SS_ENDS, change, COARSE * change.low)
-
-
-def _settle_beside(runner: Runner, found: Sequence[Findings]) -> None:
-    """Settle states beside every change; those count that settle in the case there.
-
-    A bracket counts only if something was seen beyond it, or that is granted."""
-    beside: list[tuple[Findings, Beside, str, Array]] = []  # how they start, flows in rad s-1
-    for each in found:
-        for kind, bracket in [*each.brackets.items()]:
-            seen = bracket.runs[1] or bracket.high in each.cases[kind]
-            if not (seen or runner.sampling.granted):
-                del each.brackets[kind]
-        if carried := each.brackets.get(Passage.NS_ENDS):
-            beside.append((each, Beside.NR, "on the wall", carried.high * (1 + DISTANCES_OF_NR)))
-            if runner.sampling.slow:  # a ball that sinks swings for long
-                beside.append((each, Beside.NS, "on the wall", carried.low * (1 - DISTANCES / 2)))
-        end, last = each.brackets.get(Passage.RR_ENDS), each.brackets.get(Passage.SS_ENDS)
-        if end and lifts(end):
-            beside.append((each, Beside.LIFTED, "on the wall", end.high * (1 + DISTANCES_OF_NR)))
-        elif end and last:
-            span = last.low - end.high
-            near = end.high + DISTANCES * min(span, end.high)
-            beside.append((each, Beside.SS, "rest", near))
-            beside.append((each, Beside.SS_LAST, "rest", last.low - DISTANCES_BELOW_FOLD * span))
+def _settle_beside(each: Findings) -> Procedure[None]:
+    """Settle states beside every change; those count that settle in the case there."""
+    sampling, asked = each.runner.sampling, dict[str, tuple[Case, str, Array]]()
+    if carried := each.brackets.get(NS_ENDS):
+        asked["NR"] = Case.NR, "on the wall", carried.high * (1 + DISTANCES_OF_NR)
+        if sampling.slow:  # a ball that sinks swings for long
+            asked["NS"] = Case.NS, "on the wall", carried.low * (1 - DISTANCES / 2)
+    end, last = each.brackets.get(RR_ENDS), each.brackets.get(SS_ENDS)
+    if end and lifts(end):
+        asked["lifted"] = Case.NR, "on the wall", end.high * (1 + DISTANCES_OF_NR)
+    elif end and last:
+        span = last.low - end.high
+        asked["first SS"] = Case.SS, "rest", end.high + DISTANCES * min(span, end.high)
+        asked["last SS"] = Case.SS, "rest", last.low - DISTANCES_BELOW_FOLD * span
     starts = [
-        settling.starts_at(each.set, each.p, how, flows.tolist()) for each, _, how, flows in beside
+        settling.starts_at(each.set, each.p, how, flows.tolist())
+        for _, how, flows in asked.values()
     ]
-    criteria = SettlingCriteria(
-        loose=runner.sampling.thresholds_loose, rounds=runner.sampling.thresholds_rounds
-    )
-    settled = settling.settle_groups(runner, starts, criteria)
-    for (each, which, *_), states in zip(beside, settled, strict=True):
-        each.states[which] = [
-            s for s in states if not s.failure and physical_case(s.case) is which.case
-        ]
-
-
-def _on_the_wall_and_back(each: Findings) -> Iterator[tuple[Passage, Search]]:
-    """Searches for where slip begins on the wall, and where a pressed ball rolls again.
-
-    They begin from settled states continued; the pressed one has a bit less spin."""
-    width = each.runner.sampling.thresholds_width
-    begins, carried = each.brackets.get(Passage.NS_ENDS), each.states.get(Beside.NR, [])
-    if begins and len(carried) == len(DISTANCES_OF_NR):
-        start = continued(carried, height=settling.safe_height(each.p))
-        yield each.search(Passage.NR_BEGINS, begins, width * begins.high, start)
-    end, lifted = each.brackets.get(Passage.RR_ENDS), each.states.get(Beside.LIFTED, [])
-    if end and len(lifted) == len(DISTANCES_OF_NR):
-        change = Bracket(end.low * (1 - COARSE), end.high * (1 + COARSE))
-        pressed = continued(lifted, height=0.0, less=1e-3)
-        yield each.search(Passage.RR_RETURNS, change, width * end.high, pressed)
+    criteria = SettlingCriteria(loose=sampling.thresholds_loose, rounds=sampling.thresholds_rounds)
+    found = yield from settled(*starts, criteria=criteria)
+    for (which, (case, *_)), states in zip(asked.items(), found, strict=True):
+        each.states[which] = [s for s in states if not s.failure and physical_case(s.case) is case]
 
 
 def continued(states: Sequence[SteadyState], height: float, less: float = 0.0) -> From:
@@ -436,7 +391,7 @@ def _end_of_slipping(each: Findings) -> tuple[Estimate | None, bool]:
 
     There is no fold where the floor would have to pull at that maximum, or there is none and the
     floor's force vanishes just where the wall begins to carry the ball."""
-    last, held = each.states.get(Beside.SS_LAST, []), each.brackets.get(Passage.NR_BEGINS)
+    last, held = each.states.get("last SS", []), each.brackets.get(NR_BEGINS)
     top = extrapolated(last, "slip_x", extrapolated_maximum)
     unloaded = extrapolated(last, "force_Ay", extrapolated_zero)
     off = math.inf
@@ -467,81 +422,62 @@ def extrapolated(
     return place if math.isfinite(place.uncertainty) else None
 
 
-def _fold(each: Findings) -> Iterator[tuple[Passage, Search]]:
-    """A search for the largest flow at which a ball on the floor settles, at the fold.
-
-    At a fold all slows down, like the root of the distance."""
-    top, _ = _end_of_slipping(each)
-    if top and each.runner.sampling.slow:
-        narrowest = each.runner.sampling.thresholds_fold
-        half = max(narrowest, 5.0 * top.uncertainty / top.value)
-        nearest, time = each.states[Beside.SS_LAST][0].mean, 1 / math.sqrt(narrowest)
-        width = narrowest * top.value
-        yield each.search(Passage.FOLD, around(top.value, half), width, lambda _: nearest, time)
-
-
 def _rows(each: Findings) -> Measured:
     """Rows of the end of rolling (omega_01 or omega_03), and of omega_02."""
     none = "no flow that was tried, up to twice the fastest of the settled states,"
-    if not (rolling := each.bracket_seen(Passage.RR_ENDS)):
+    if not (rolling := each.bracket_seen(RR_ENDS)):
         yield each.missing(f"{none} ends two-point rolling")
     elif lifts(rolling):
         yield each.row("lifts", 1.0, rolling.tasks)
         yield each.row_of_bracket("omega_03", rolling, "from below", "loss of the floor")
-        if returns := each.bracket_seen(Passage.RR_RETURNS):
+        if returns := each.bracket_seen(RR_RETURNS):
             by = "return to rolling when pressed"
             yield each.row_of_bracket("omega_03", returns, "from above", by)
         else:
-            why = "a lifted ball did not settle, and could not be pressed back to the floor"
-            yield each.missing(f"{why}: no second omega_03")
+            yield each.missing("no lifted ball settled that could be pressed back to the floor")
     else:
         yield each.row("lifts", 0.0, rolling.tasks)
         yield each.row_of_bracket("omega_01", rolling, "from below", "onset of slip")
         by = "lag of settled slipping"
-        yield from each.rows_of_zero(Beside.SS, "lag", "omega_01", "from above", by)
-    if begins := each.bracket_seen(Passage.NR_BEGINS):
+        yield from each.rows_of_zero("first SS", "lag", "omega_01", "from above", by)
+    if begins := each.bracket_seen(NR_BEGINS):
         yield each.row_of_bracket("omega_02", begins, "from above", "onset of sliding on the wall")
     else:
         yield each.missing(f"{none} is the least to hold a ball on the wall")
     by = "speed of settled sinking"
-    yield from each.rows_of_zero(Beside.NS, "v_y", "omega_02", "from below", by)
+    yield from each.rows_of_zero("NS", "v_y", "omega_02", "from below", by)
 
 
-def _rows_of_slipping(each: Findings) -> Measured:
+def _rows_of_slipping(
+    each: Findings, from_rest: Mapping[float, Case], top: Estimate | None, smooth: bool
+) -> Measured:
     """Rows of the end of slipping, at a fold or at omega_02, and the number of folds."""
-    if Beside.SS_LAST not in each.states:
-        if (rolling := each.bracket_seen(Passage.RR_ENDS)) and not lifts(rolling):
+    if "last SS" not in each.states:
+        if (rolling := each.bracket_seen(RR_ENDS)) and not lifts(rolling):
             yield each.missing("no end of slipping at both points was found", 3)
         return
-    top, smooth = _end_of_slipping(each)
-    tasks = [state.task for state in each.states[Beside.SS_LAST]]
+    tasks = [state.task for state in each.states["last SS"]]
     # At how many of the rising flows that were tried a ball from rest ceases to settle in SS.
-    said: dict[float, bool | None] = {
-        flow: case is Case.SS for flow, case in each.cases[Passage.SS_ENDS].items()
-    }
-    if tried := each.brackets.get(Passage.SS_ENDS):  # between its ends a ball settles too slowly
+    said: dict[float, bool | None] = {flow: case is Case.SS for flow, case in from_rest.items()}
+    if tried := each.brackets.get(SS_ENDS):  # between its ends a ball settles too slowly
         said |= {flow: answer for flow, answer in tried.said if flow in tried.ends}
     ends = sum(bool(said[slow]) and said[fast] is False for slow, fast in pairwise(sorted(said)))
-    settles = len(tasks) >= POINTS
     # Beside known flows only a ball may have settled at none beyond the last.
-    told = settles and (smooth or top is not None)
+    told = len(tasks) >= POINTS and (smooth or top is not None)
     if told and (ends or not each.runner.sampling.granted):
         yield each.row("folds", float(ends - smooth), tasks)
     if smooth:
         by = "floor force of settled slipping"
-        yield from each.rows_of_zero(Beside.SS_LAST, "force_Ay", "omega_02", "from below", by)
+        yield from each.rows_of_zero("last SS", "force_Ay", "omega_02", "from below", by)
     elif top is None:
-        why = "settled slipping points to no flow at which it ends"
-        yield each.missing(why, 3)
+        yield each.missing("settled slipping points to no flow at which it ends", 3)
     else:
         by = "maximum of omega_0 along the branch"
         yield each.row("omega_04", top, tasks, side="from below", by=by)
-        if fold := each.bracket_seen(Passage.FOLD):
+        if fold := each.bracket_seen(FOLD):
             yield each.row_of_bracket("omega_04", fold, "from below", "last settled slipping")
         else:
-            slow = "costs more than an engine beside the one on trial may"
-            why = "the end of slipping at both points is extrapolated; to bracket it "
-            yield each.missing(why + ("could not be done" if each.runner.sampling.slow else slow))
+            yield each.missing("the end of slipping at both points is extrapolated, not bracketed")
 
 
 PROTOCOLS = (Protocol("thresholds", measure, ("settled",)),)
