@@ -115,13 +115,12 @@ forget much more. So it is anything between none and all of the difference: a un
 distribution."""
 
 
-def at_zero_step(coarse: float, fine: Estimate) -> Estimate:
+def at_zero_step(coarse: float, fine: Estimate, **causes: float) -> Estimate:
     """The limit of a vanishing step of a number that is a smooth function of it, from the values
-    with a step and with half of it."""
+    with a step and with half of it; with further causes of error."""
     change = fine.value - coarse
-    return replace(fine, value=fine.value + change * EXTRAPOLATION).also(
-        time_step=abs(change) * DOUBT
-    )
+    limit = replace(fine, value=fine.value + change * EXTRAPOLATION)
+    return limit.also(time_step=abs(change) * DOUBT, **causes)
 
 
 def of_no_order(coarse: float, fine: Estimate) -> Estimate:

@@ -21,21 +21,20 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Unpack
 
 import numpy as np
 
 from compare.campaign.tasks import Task
-from compare.method.brackets import Attempt, Bracket, Search, narrow
+from compare.method.brackets import Attempt, Bracket, Search
 from compare.method.conditions import Conditions, state_of
 from compare.method.protocol import Protocol
-from compare.method.record import Measured, Measurement, Missing, Records, Sets, if_found
+from compare.method.record import Found, Measured, Measurement, Missing, Records, Sets, if_found
 from compare.method.runner import Runner, coarse_step
 from compare.method.scales import dragged_speed, slip_unit, time_unit
-from compare.method.settling import settle_groups, starts_at
+from compare.method.settling import starts_at
 from compare.method.statistics import (
     Estimate,
     estimate,
@@ -57,6 +56,7 @@ from compare.method.step_pairs import (
     polynomials,
     random_state,
 )
+from compare.method.together import Procedure, asked, narrowed, settled, together
 from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
 from model.drag import STOKES
@@ -73,27 +73,16 @@ PUSHES = {
 """Arrows of Fig. 6 along which slip begins, and directions at the quick level."""
 SLIPS = {Case.RS: (1,), Case.SR: (0,), Case.SS: (0, 1, 2), Case.NS: (1, 2)}
 """Which of slip_x, slip_y, slip_z a case allows beyond the one it leaves."""
-
-
-RECORD_STEPS = 20
-"""Of a record of slip."""
-RECORD_SKIPPED = 6
-"""At its start, in which contact forces build up."""
-RECORD_SETTLED = 6
-"""At its end, in which the case must be the same for a slip to have passed into it."""
+# steps of a record of slip; at its start, where contact forces build up; and at its end, in which
+# the case must be the same for a slip to have passed into it
+RECORD_STEPS, RECORD_SKIPPED, RECORD_SETTLED = 20, 6, 6
 RECORD_DEGREES = (4, 3)
 """Of the polynomials; the lower one shows what the degree changes."""
-LARGE_SLIPS = (3.0, 1.5)
-"""Slips at the start, in units of `start_unit`, each half of the one before: so large that they
-neither end nor turn much in a record."""
-SMALL_SLIPS = (0.3, 0.15)
-"""Those where one contact has to hold."""
-SLIPS_BESIDE = (1.2, 0.6, 0.3)
-"""Those beside a slip that is there already, where the direction depends on the size."""
-FAST_SLIPS = (1.0, 0.5)
-"""Those of a ball that hangs on a smooth wall, and so goes fast."""
-
-
+# Slips at the start, in units of `start_unit`, each half of the one before:
+LARGE_SLIPS = (3.0, 1.5)  # so large that they neither end nor turn much in a record
+SMALL_SLIPS = (0.3, 0.15)  # where one contact has to hold
+SLIPS_BESIDE = (1.2, 0.6, 0.3)  # beside a slip that is there: the direction depends on the size
+FAST_SLIPS = (1.0, 0.5)  # of a ball that hangs on a smooth wall, and so goes fast
 AT_START = slope_error(
     np.arange(RECORD_SKIPPED, RECORD_STEPS + 1.0), RECORD_DEGREES[0]
 ) / slope_error(np.arange(-HALF_WINDOW, HALF_WINDOW + 1.0), WINDOW_DEGREES[0])
@@ -103,40 +92,43 @@ FRICTIONLESS = "without friction at both contacts there is nothing that rolls"
 
 def measure(runner: Runner, sets: Sets, records: Records) -> Measured:
     """gamma out of random states, along every arrow; of two sides their shares (69)."""
+    rough = yield from _rough(runner, sets)
+    pushed = (_grow(pushes) for name, p in rough.items() for pushes in _pushes(runner, name, p))
+    yield from together(runner, pushed)
+
+
+def _rough(runner: Runner, sets: Sets) -> Found[Sets]:
+    """The sets with friction at both contacts."""
     rough = {name: p for name, p in sets.items() if p.mu and p.eta}
     yield from (runner.missing(name, FRICTIONLESS) for name in sets if name not in rough)
-    sides = [pushes for name, p in rough.items() for pushes in _pushes(runner, name, p)]
-    tasks = [push.tasks() for pushes in sides for push in pushes]
-    runs = zip(tasks, runner.groups(tasks), strict=True)
-    left = Counter[tuple[str, str]]()
-    for pushes in sides:
-        grown = []
-        for push in pushes:
-            own, pairs = next(runs)
-            if isinstance(pairs, str):
-                yield runner.missing(push.start.set, f"{push.arrow}: the run {pairs}")
-            elif value := push.growth(pairs):
-                grown.append(value)
-                yield push.row("gamma", value, own)
-            elif stray := push.stray(own, pairs):
-                yield stray
-            else:
-                left[push.start.set, push.arrow] += 1
+    return rough
+
+
+def _grow(pushes: Sequence[Push]) -> Procedure[None]:
+    """gamma of a push, or of two to either side."""
+    tasks = [push.tasks() for push in pushes]
+    found, grown = (yield from asked(*tasks)), []
+    for push, own, runs in zip(pushes, tasks, found, strict=True):
+        if isinstance(runs, str):
+            yield push.missing(f"the run {runs}")
+        elif value := push.growth(runs):
+            grown.append(value)
+            yield push.row("gamma", value, own)
+        else:
+            yield push.stray(own, runs) or push.missing(STRAYS)
+    if len(grown) == 2:
         # the share of the side of negative slip with which the two growth rates cancel
-        if len(grown) == 2:
-            plus, minus = grown if pushes[0].n.sum() > pushes[1].n.sum() else grown[::-1]
-            both = plus.value + minus.value
-            share = estimate(
-                plus.value / both,
-                1 / both**2,
-                ahead=plus.uncertainty * abs(minus.value),
-                back=minus.uncertainty * abs(plus.value),
-            )
-            for side, of in ("ahead", plus), ("back", minus):
-                share = share.told_apart(side, [of], [1.0])
-            yield push.row("filippov_share", share, own)
-    for (name, arrow), count in left.items():
-        yield runner.missing(name, f"slips {arrow} pass through several cases", count)
+        plus, minus = grown if pushes[0].n.sum() > pushes[1].n.sum() else grown[::-1]
+        both = plus.value + minus.value
+        share = estimate(
+            plus.value / both,
+            1 / both**2,
+            ahead=plus.uncertainty * abs(minus.value),
+            back=minus.uncertainty * abs(plus.value),
+        )
+        for side, of in ("ahead", plus), ("back", minus):
+            share = share.told_apart(side, [of], [1.0])
+        yield push.row("filippov_share", share, own)
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,11 +144,6 @@ class Push:
     inner: Case
     outer: Case
     n: Array  # direction, a unit vector (3,) of slip_x, slip_y, slip_z
-
-    @property
-    def arrow(self) -> str:
-        """Between which cases, in words."""
-        return f"from {self.inner.name} to {self.outer.name}"
 
     @property
     def sizes(self) -> tuple[float, ...]:
@@ -231,6 +218,11 @@ class Push:
                 return self.row("case", ended, own, slip=slip, time=time)
         return None
 
+    def missing(self, why: str, rows: int = 1) -> Missing:
+        """A record of what was not measured, and why."""
+        arrow = f"from {self.inner.name} to {self.outer.name}"
+        return self.runner.missing(self.start.set, f"{arrow}: {why}", rows)
+
     def row(
         self,
         quantity: str,
@@ -243,6 +235,9 @@ class Push:
         cases = Conditions(inner=self.inner.name, outer=self.outer.name, by=start.name)
         at = cases | state_of(start.x0) | Conditions(n_x=n_x, n_y=n_y, n_z=n_z) | at
         return self.runner.measurement(start.set, start.p, quantity, value, tasks, **at)
+
+
+STRAYS = "slips pass through several cases"
 
 
 def zero_size_limit(rates: Array) -> Array:
@@ -303,49 +298,53 @@ def steepest(runner: Runner, sets: Sets, records: Records) -> Measured:
     rough = {name: p for name, p in sets.items() if p.eta and p.c}
     why = "without friction at the wall, or drag, no direction stands out"
     yield from (runner.missing(name, why) for name in sets if name not in rough)
-    # random states, each pushed at angles all round from slip_z to slip_y of the wall's contact
-    fans = []
-    for name, p in rough.items():
-        rng = np.random.default_rng([58, *name.encode()])
-        for _ in range(runner.sampling.steepest_states):
-            x = random_state(Case.NR, p, rng)
-            # The fluid pulls along the orbit, by half the weight to three times it: that turns the
-            # direction.
-            pull = rng.choice([-1, 1]) * rng.uniform(0.5, 3.0)
-            q = p.replace(omega_0=State.of(x).omega_c + pull * dragged_speed(p) / p.R)
-            betas = np.linspace(0.0, 2 * np.pi, 8, endpoint=False)
-            ways = (np.array([0.0, np.sin(beta), np.cos(beta)]) for beta in betas)
-            start = Start(name, q, "", x)
-            fans.append([Push(runner, start, Case.NR, Case.NS, n) for n in ways])
-    runs = runner.groups([push.tasks() for fan in fans for push in fan])
-    for fan in fans:
-        why, grown = "slip along some direction did not last, or no direction stands out", []
-        for push in fan:
-            if isinstance(got := next(runs), str):
-                why = f"the run {got}"
-            elif value := push.growth(got):
-                grown.append(value)
-        start, tasks = fan[0].start, [task for push in fan for task in push.tasks()]
-        angle = math.nan
-        if len(grown) == len(fan):
-            harmonics = np.fft.rfft([g.value for g in grown]) * 2 / len(fan)
-            angle = float(-np.angle(harmonics[1]))
-        if not abs(angle) < 3:  # one near pi may come out on either side of it
-            yield runner.missing(start.set, why)
-            continue
-        worst = max(grown, key=lambda g: g.uncertainty)
-        scatter = np.sqrt(2.0 / len(fan)) * worst.uncertainty
-        others = np.arange(2, len(harmonics)) @ np.abs(harmonics[2:])
-        first = float(np.abs(harmonics[1]))
-        beta = estimate(angle, 1 / first, rates=float(scatter), harmonics=float(others))
-        beta = beta.told_apart("rates", [worst], [1.0])
-        yield runner.measurement(start.set, start.p, "steepest", beta, tasks, **state_of(start.x0))
+    fans = (_turn(fan) for name, p in rough.items() for fan in _fans(runner, name, p))
+    yield from together(runner, fans)
 
 
-AROUND = (0.7, 1.3)
-"""The second two flows, divided by the zero that the first two show."""
-AROUND_BENT = (0.8, 1.1)
-"""The same where the law of drag bends the line."""
+def _fans(runner: Runner, name: str, p: Parameters) -> Iterator[list[Push]]:
+    """Pushes out of random states of a set, at angles all round from slip_z to slip_y of the wall's
+    contact."""
+    rng = np.random.default_rng([58, *name.encode()])
+    for _ in range(runner.sampling.steepest_states):
+        x = random_state(Case.NR, p, rng)
+        # The fluid pulls along the orbit, by half the weight to three times it: that turns the
+        # direction.
+        pull = rng.choice([-1, 1]) * rng.uniform(0.5, 3.0)
+        q = p.replace(omega_0=State.of(x).omega_c + pull * dragged_speed(p) / p.R)
+        betas = np.linspace(0.0, 2 * np.pi, 8, endpoint=False)
+        ways = (np.array([0.0, np.sin(beta), np.cos(beta)]) for beta in betas)
+        yield [Push(runner, Start(name, q, "", x), Case.NR, Case.NS, n) for n in ways]
+
+
+def _turn(fan: Sequence[Push]) -> Procedure[None]:
+    """The direction in which slip of a fan grows the most."""
+    tasks, first = [push.tasks() for push in fan], fan[0]
+    found, grown, why = (yield from asked(*tasks)), [], "no direction lasts, or stands out"
+    for push, runs in zip(fan, found, strict=True):
+        if isinstance(runs, str):
+            why = f"the run {runs}"
+        elif value := push.growth(runs):
+            grown.append(value)
+    angle = math.nan
+    if len(grown) == len(fan):
+        harmonics = np.fft.rfft([g.value for g in grown]) * 2 / len(fan)
+        angle = float(-np.angle(harmonics[1]))
+    if not abs(angle) < 3:  # one near pi may come out on either side of it
+        yield first.missing(why)
+        return
+    worst = max(grown, key=lambda g: g.uncertainty)
+    scatter = np.sqrt(2.0 / len(fan)) * worst.uncertainty
+    others = np.arange(2, len(harmonics)) @ np.abs(harmonics[2:])
+    size = 1 / float(np.abs(harmonics[1]))
+    beta = estimate(angle, size, rates=float(scatter), harmonics=float(others))
+    beta = beta.told_apart("rates", [worst], [1.0])
+    at, own = state_of(first.start.x0), [task for each in tasks for task in each]
+    yield first.runner.measurement(first.start.set, first.start.p, "steepest", beta, own, **at)
+
+
+# the second two flows, divided by the zero that the first two show
+AROUND, AROUND_BENT = (0.7, 1.3), (0.8, 1.1)  # the latter where the law of drag bends the line
 MOST_BEYOND = 2.1
 """Largest zero recorded, divided by the largest value at which slip stayed in its case."""
 MOST_FOLLOWED = 100.0
@@ -356,155 +355,121 @@ HANGING = (1.05, 1.6, 1.3)
 
 def bounds(runner: Runner, sets: Sets, records: Records) -> Measured:
     """Zero and slope of gamma along every line: from two flows, then two more at the zero."""
-    rough = {name: p for name, p in sets.items() if p.mu and p.eta}
-    yield from (runner.missing(name, FRICTIONLESS) for name in sets if name not in rough)
-    hanging = _hanging(runner, rough, records)
-    lines = [line for name, p in rough.items() for line in _lines_from_rolling(runner, name, p)]
-    lines += hanging.values()
-    why = "no flow was found at which the wall alone carries the ball"
-    yield from (runner.missing(name, why) for name in rough if name not in hanging)
-    first = _growths(runner, [line.pushes[:2] for line in lines])
-    around = [line.around(seen.values) for line, seen in zip(lines, first, strict=True)]
-    for line, seen, more in zip(lines, first, _growths(runner, around), strict=True):
-        yield from _zero_and_slope(line, seen, more)
+    rough = yield from _rough(runner, sets)
+    rolling = [_cross(each) for name in rough for each in _lines(runner, name, rough[name])]
+    hanging = [_cross_hanging(runner, name, p, records) for name, p in rough.items()]
+    yield from together(runner, rolling + hanging)
 
 
-def _hanging(runner: Runner, sets: Sets, records: Records) -> dict[str, Crossing]:
-    """Pushes out of settled states of sets whose wall alone carries the ball, by set."""
-    ends = {name: end.value for name in sets if (end := records.threshold(name, "omega_02"))}
-    starts = [
-        starts_at(name, sets[name], "on the wall", [end * factor for factor in HANGING])
-        for name, end in ends.items()
-    ]
-    lines = {}
-    for name, states in zip(ends, settle_groups(runner, starts), strict=True):
+def _cross_hanging(runner: Runner, name: str, p: Parameters, records: Records) -> Procedure[None]:
+    """Zero and slope of gamma out of settled states of a ball that the wall alone carries."""
+    if end := records.threshold(name, "omega_02"):
+        flows = [end.value * factor for factor in HANGING]
+        (states,) = yield from settled(starts_at(name, p, "on the wall", flows))
         if all(state.settled_in(Case.NR) for state in states):
             pushes = []
             for state in states:
-                x = np.array([sets[name].R, 0, *state.mean[2:4], 0, 0, 0, 0])
+                x = np.array([p.R, 0, *state.mean[2:4], 0, 0, 0, 0])
                 rides = replace(state.start, name="stationary", x0=x)
                 pushes.append(Push(runner, rides, Case.NR, Case.NS, np.array([0, 0, 1])))
-            lines[name] = Crossing(tuple(pushes))
-    return lines
+            yield from _cross(pushes[:2], pushes[2:])
+            return
+    yield runner.missing(name, "no flow was found at which the wall alone carries the ball")
 
 
-@dataclass(frozen=True, eq=False)
-class Crossing:
-    """Pushes at several flows, between which gamma passes through zero."""
+def _cross(pushes: Sequence[Push], more: Sequence[Push] = ()) -> Procedure[None]:
+    """Zero and slope of gamma along a line of states, from pushes at two flows, and from `more`, or
+    where the first two show the zero.
 
-    pushes: tuple[Push, ...]
-    """At the first two flows; and others, where those around the zero can't be had."""
+    gamma is a line in omega_0, or in its square where the orbit goes with it; but drag that isn't
+    linear in the lag bends it."""
+    push = pushes[0]
+    power = 1 if push.start.name == "held" else 2
+    curved = power == 1 and push.start.p.drag != STOKES
+    seen = yield from _growths(pushes)
+    if any(math.isnan(gamma.value) for gamma in seen.gammas):
+        yield from seen.strays or [push.missing(STRAYS, 2)]
+        return
+    near = AROUND_BENT if curved else AROUND
+    later = yield from _growths(more or _around(seen, push, power, near))
+    known = zip(seen.flows + later.flows, seen.gammas + later.gammas, strict=True)
+    flows, gammas = zip(*((flow, g) for flow, g in known if not math.isnan(g.value)), strict=True)
+    q, tasks = np.array(flows) ** power, seen.tasks + later.tasks
+    # What the step changes may be little by chance at one of the flows. Points of a line share
+    # causes of error: more of them don't reduce the uncertainty.
+    least = max(gamma.uncertainty for gamma in seen.gammas)
+    more_sure = 1.0 if curved else math.sqrt(len(q))
+    points = [replace(g, uncertainty=max(g.uncertainty, least) * more_sure) for g in gammas]
+    zero, slope = zero_and_slope(q, points) if curved else straight_line(q, points)
+    square = "_square" if power == 2 else ""
+    if abs(zero.value) <= MOST_BEYOND * np.abs(q).max():
+        why = f"growth has no zero, {push.start.name}"
+        yield if_found(push.row(f"gamma_zero{square}", zero, tasks), why)
+    else:
+        yield push.missing("growth is zero only far beyond the flows at which this case lasts")
+    row = push.row(f"gamma_slope{square}", slope, tasks)
+    yield if_found(row, f"growth has no slope, {push.start.name}")
 
-    @property
-    def power(self) -> int:
-        """Power of omega_0 in which gamma is a line: 2 where the orbit goes with the flow."""
-        return 1 if self.pushes[0].start.name == "held" else 2
 
-    @property
-    def is_curved(self) -> bool:
-        """Whether gamma isn't a straight line over omega_0, as drag isn't in the lag."""
-        return self.power == 1 and self.pushes[0].start.p.drag != STOKES
-
-    def around(self, gammas: Array) -> tuple[Push, ...]:
-        """Pushes at two flows around the zero of the line through the first two, if any."""
-        if len(self.pushes) > 2:
-            return self.pushes[2:]
-        flows = np.array([push.start.p.omega_0 for push in self.pushes])
-        q = flows**self.power
-        slope = np.diff(gammas)[0] / np.diff(q)[0]
-        zero = float(q[0] - gammas[0] / slope) if slope else math.inf
-        if not 0 < zero < (MOST_FOLLOWED * max(flows)) ** self.power:  # or nan
-            return ()
-        least, first = flows[0] if self.power == 1 else 0.0, self.pushes[0]
-        pushes = []
-        for factor in AROUND_BENT if self.is_curved else AROUND:
-            omega_0 = float(least + (zero ** (1 / self.power) - least) * factor)
-            orbit = State.of(first.start.x0).omega_c if self.power == 1 else omega_0
-            p, x0 = first.start.p.replace(omega_0=omega_0), State(omega_c=orbit).stacked()
-            pushes.append(replace(first, start=replace(first.start, p=p, x0=x0)))
-        return tuple(pushes)
+def _around(seen: Growths, first: Push, power: int, near: Sequence[float]) -> list[Push]:
+    """Pushes at flows near the zero of the line through gamma at two flows, if any."""
+    q, (low, high) = np.array(seen.flows) ** power, (gamma.value for gamma in seen.gammas)
+    slope = (high - low) / np.diff(q)[0]
+    zero = float(q[0] - low / slope) if slope else math.inf
+    if not 0 < zero < (MOST_FOLLOWED * max(seen.flows)) ** power:
+        return []
+    least, pushes = seen.flows[0] if power == 1 else 0.0, []
+    for factor in near:
+        omega_0 = float(least + (zero ** (1 / power) - least) * factor)
+        orbit = State.of(first.start.x0).omega_c if power == 1 else omega_0
+        p, x0 = first.start.p.replace(omega_0=omega_0), State(omega_c=orbit).stacked()
+        pushes.append(replace(first, start=replace(first.start, p=p, x0=x0)))
+    return pushes
 
 
 @dataclass(frozen=True, eq=False)
 class Growths:
     """gamma at some flows of a line, for a vanishing step and size of slip."""
 
-    flows: list[float]  # rad s-1
-    gammas: list[Estimate]  # rad s-2; nan where a slip didn't last
-    tasks: list[Task]
+    flows: list[float] = field(default_factory=list)  # rad s-1
+    gammas: list[Estimate] = field(default_factory=list)  # rad s-2; nan where a slip didn't last
+    tasks: list[Task] = field(default_factory=list)
     # what became of slips that didn't last, and of runs that broke down
-    strays: list[Measurement | Missing]
-
-    @property
-    def values(self) -> Array:
-        """Those of gamma."""
-        return np.array([gamma.value for gamma in self.gammas])
+    strays: list[Measurement | Missing] = field(default_factory=list)
 
 
-def _growths(runner: Runner, rows: Sequence[Sequence[Push]]) -> list[Growths]:
+def _growths(pushes: Sequence[Push]) -> Procedure[Growths]:
     """gamma of pushes, from two sizes of slip with the short step, one with the long one.
 
     It is uncertain by what the step and the degree of the polynomials change."""
-    tasks, divisor = [], runner.sampling.bounds_divisor
-    for push in (push for pushes in rows for push in pushes):
+    tasks, found = [], Growths()
+    for push in pushes:
+        divisor = push.runner.sampling.bounds_divisor
         large, small = (push.pair(size, divisor) for size in push.sizes)
         tasks.append([*large, small[1]])
-    results, found = zip(tasks, runner.groups(tasks), strict=True), []
-    for pushes in rows:
-        gammas, used, strays = list[Estimate](), list[Task](), list[Measurement | Missing]()
-        for push in pushes:
-            own, runs = next(results)
-            used += own
-            if isinstance(runs, str):
-                why = f"from {push.inner.name}: the run {runs}"
-                strays.append(runner.missing(push.start.set, why, 2))
-                gammas.append(estimate(math.nan))
-                continue
-            if stray := push.stray(own[:2], runs[:2]):
-                strays.append(stray)
-            coarse, fine, half = (push.rates(run) for run in runs)
-            best, change = zero_size_limit(np.array([fine, half])), (fine - coarse)[0]
-            gamma = estimate(
-                best[0] + change * EXTRAPOLATION,
-                time_step=abs(change) * DOUBT,
-                degree=uniform(abs(best[1] - best[0])),
-                lag=lag_error(runner, push.start.p, divisor) * slip_unit(push.start.p),
-            )
-            gammas.append(gamma)
-        flows = [push.start.p.omega_0 for push in pushes]
-        found.append(Growths(flows, gammas, used, strays))
+    for push, own, runs in zip(pushes, tasks, (yield from asked(*tasks)), strict=True):
+        found.flows.append(push.start.p.omega_0)
+        found.tasks.extend(own)
+        if isinstance(runs, str):
+            found.strays.append(push.missing(f"the run {runs}", 2))
+            found.gammas.append(estimate(math.nan))
+            continue
+        if stray := push.stray(own[:2], runs[:2]):
+            found.strays.append(stray)
+        coarse, fine, half = (push.rates(run) for run in runs)
+        best, change = zero_size_limit(np.array([fine, half])), (fine - coarse)[0]
+        gamma = estimate(
+            best[0] + change * EXTRAPOLATION,
+            time_step=abs(change) * DOUBT,
+            degree=uniform(abs(best[1] - best[0])),
+            lag=lag_error(push.runner, push.start.p, divisor) * slip_unit(push.start.p),
+        )
+        found.gammas.append(gamma)
     return found
 
 
-def _zero_and_slope(line: Crossing, seen: Growths, more: Growths) -> Measured:
-    """Measurements of zero and slope of gamma along a line, from what was seen at the first flows
-    and around the zero."""
-    push, runner, tasks = line.pushes[0], line.pushes[0].runner, [*seen.tasks, *more.tasks]
-    if np.isnan(seen.values).any():
-        why = f"slips {push.arrow} pass through several cases"
-        yield from seen.strays or [runner.missing(push.start.set, why, 2)]
-        return
-    known = zip([*seen.flows, *more.flows], [*seen.gammas, *more.gammas], strict=True)
-    flows, gammas = zip(*((flow, g) for flow, g in known if not math.isnan(g.value)), strict=True)
-    q = np.array(flows) ** line.power
-    # What the step changes may be little by chance at one of the flows. Points of a line share
-    # causes of error: more of them don't reduce the uncertainty.
-    least = max(gamma.uncertainty for gamma in seen.gammas)
-    more_sure = 1.0 if line.is_curved else math.sqrt(len(q))
-    points = [replace(g, uncertainty=max(g.uncertainty, least) * more_sure) for g in gammas]
-    zero, slope = zero_and_slope(q, points) if line.is_curved else straight_line(q, points)
-    growth = f"growth of slip {push.arrow}, {push.start.name},"
-    square = "_square" if line.power == 2 else ""
-    if abs(zero.value) <= MOST_BEYOND * np.abs(q).max():
-        yield if_found(push.row(f"gamma_zero{square}", zero, tasks), f"{growth} has no zero")
-    else:
-        why = f"{growth} is zero only far beyond the flows at which the ball stays in this case"
-        yield runner.missing(push.start.set, why)
-    yield if_found(push.row(f"gamma_slope{square}", slope, tasks), f"{growth} has no slope")
-
-
-def _lines_from_rolling(runner: Runner, name: str, p: Parameters) -> Iterator[Crossing]:
-    """Pushes out of RR at flows along a line, scaled by friction and inertia, by bound."""
+def _lines(runner: Runner, name: str, p: Parameters) -> Iterator[list[Push]]:
+    """Pushes out of RR at two flows of a line, scaled by friction and inertia, by bound."""
     unit = time_unit(p)
     slow = 0.5 / unit * min(1.0, math.sqrt(p.mu / max(p.eta, p.j)))
     rubbing, spinning = math.sqrt(p.mu) / unit, math.sqrt(1 / p.j) / unit
@@ -524,7 +489,7 @@ def _lines_from_rolling(runner: Runner, name: str, p: Parameters) -> Iterator[Cr
             Start(name, p.replace(omega_0=flow), by, State(omega_c=orbit).stacked())
             for flow, orbit in zip(flows, orbits, strict=True)
         )
-        yield Crossing(tuple(Push(runner, start, Case.RR, outer, np.array(n)) for start in starts))
+        yield [Push(runner, start, Case.RR, outer, np.array(n)) for start in starts]
 
 
 ARROWS: dict[tuple[Case, Case], tuple[float, float, float]] = {
@@ -542,63 +507,74 @@ FIRST_ORBITS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5)
 """Orbits at which the force on the floor is measured first, omega_c sqrt(R/g)."""
 LATER_ORBITS = (0.05, 0.08, 0.12, 0.17)
 """Relative distances of others below that at which the ball leaves the floor."""
-LIFT_STEPS = 16
-"""Of a run in which the force on the floor is measured."""
-LIFT_SKIPPED = 4
-"""At its start, in which contact forces build up."""
-FEWEST_PRESSED = 5
-"""Samples on the floor that must be left."""
+# steps of a run in which the force on the floor is measured; at its start, where contact forces
+# build up; and the fewest samples on the floor that must be left
+LIFT_STEPS, LIFT_SKIPPED, FEWEST_PRESSED = 16, 4, 5
 LIFT_DEGREES = (3, 2)
 """Of the polynomials; the lower one shows what the degree changes."""
 
 
 def lift(runner: Runner, sets: Sets, records: Records) -> Measured:
     """omega_c at which the ball leaves the floor, along every arrow; or that it doesn't."""
-    arrows = [Arrow(runner, name, p, *arrow) for name, p in sets.items() for arrow in ARROWS]
-    orbits = [
-        [arrow.task(Omega / time_unit(arrow.p)) for Omega in FIRST_ORBITS] for arrow in arrows
-    ]
-    first = list(runner.groups(orbits))
-    kept = [
-        [] if isinstance(got, str) else arrow.staying(got)
-        for arrow, got in zip(arrows, first, strict=True)
-    ]
-    nearer = [arrow.tasks_near_onset(runs) for arrow, runs in zip(arrows, kept, strict=True)]
-    searches = [arrow.search(runs) for arrow, runs in zip(arrows, kept, strict=True)]
-    careful = not runner.sampling.granted
-    brackets = iter(narrow(runner, [search for search in searches if search], careful))
-    found = [next(brackets) if search else None for search in searches]
-    rows = zip(arrows, orbits, first, kept, found, nearer, runner.groups(nearer), strict=True)
-    for arrow, tasks, got, runs, bracket, later, near in rows:
-        leaves = next((Case(int(run.case[-1])) for run in runs if _force(run) is None), None)
-        if not runs:
-            strays = "the ball doesn't stay in it at any orbit"
-            why = f"the run {got}" if isinstance(got, str) else strays
-            yield runner.missing(arrow.set, f"out of {arrow.inner.name}: {why}")
-        elif leaves is None:
-            fastest = float(runs[-1].omega_c[0])
-            yield arrow.row("lifts", fastest, 0.0, tasks)
-            if arrow.inner is not Case.RR:  # whose floor and wall share the load in any way
-                load = None if isinstance(near, str) else _load(runner, near)
-                row = arrow.row("moving_force_Ay", fastest, load or math.nan, later)
-                yield if_found(row, f"the force of the floor in {arrow.inner.name} is none")
-        elif leaves is not arrow.outer:
-            why = f"a ball that leaves the floor out of {arrow.inner.name} ends in {leaves.name}"
-            yield runner.missing(arrow.set, why)
-        elif bracket:
-            last, _ = bracket.runs
-            if bracket.failure or not last or not arrow.staying([last]):
-                slips = "the ball slips before it leaves the floor"
-                why = f"the run {bracket.failure}" if bracket.failure else slips
-                yield runner.missing(arrow.set, f"out of {arrow.inner.name}: {why}")
-            else:
-                yield arrow.row("lift_onset", 1 / time_unit(arrow.p), bracket.place, bracket.tasks)
-        elif isinstance(near, str) or (onset := _onset(near)) is None:
-            chatters = "the contact at the floor opens and closes"
-            why = f"the run {near}" if isinstance(near, str) else chatters
-            yield runner.missing(arrow.set, f"where the ball leaves {arrow.inner.name} {why}")
+    arrows = (Arrow(runner, name, p, *arrow) for name, p in sets.items() for arrow in ARROWS)
+    yield from together(runner, map(_lift, arrows))
+
+
+def _lift(arrow: Arrow) -> Procedure[None]:
+    """omega_c at which the ball leaves the floor along an arrow."""
+    runner, unit = arrow.runner, time_unit(arrow.p)
+    tasks = [arrow.task(Omega / unit) for Omega in FIRST_ORBITS]
+    (got,) = yield from asked(tasks)
+    runs = [] if isinstance(got, str) else arrow.staying(got)
+    if not runs:
+        strays = "the ball doesn't stay in it at any orbit"
+        yield arrow.missing(f"the run {got}" if isinstance(got, str) else strays)
+        return
+    orbits, forces = [float(run.omega_c[0]) for run in runs], [_force(run) for run in runs]
+    halves = runner.sampling.halves
+    if None not in forces:
+        fastest = orbits[-1]
+        yield arrow.row("lifts", fastest, 0.0, tasks)
+        if arrow.inner is not Case.RR:  # whose floor and wall share the load in any way
+            later = [arrow.task(fastest, times) for times in halves]
+            (near,) = yield from asked(later)
+            load = None if isinstance(near, str) else _load(runner, near)
+            row = arrow.row("moving_force_Ay", fastest, load or math.nan, later)
+            yield if_found(row, f"the force of the floor in {arrow.inner.name} is none")
+        return
+    off = forces.index(None)
+    if (leaves := Case(int(runs[off].case[-1]))) is not arrow.outer:
+        yield arrow.missing(f"a ball that leaves the floor ends in {leaves.name}")
+    elif arrow.inner is Case.RR and off:
+        width = runner.sampling.thresholds_width * orbits[off]
+        around = Bracket(orbits[off - 1], orbits[off])
+
+        def task(omega_c: float, bracket: Bracket, attempt: Attempt) -> Task:
+            return arrow.task(omega_c, attempt.divisor)
+
+        search = Search(around, task, lambda run: _force(run) is not None, width)
+        (bracket,) = yield from narrowed(search, careful=not runner.sampling.granted)
+        last, _ = bracket.runs
+        if bracket.failure or not last or not arrow.staying([last]):
+            slips = "the ball slips before it leaves the floor"
+            yield arrow.missing(f"the run {bracket.failure}" if bracket.failure else slips)
         else:
-            yield arrow.row("lift_onset", 1 / time_unit(arrow.p), onset, later)
+            yield arrow.row("lift_onset", 1 / unit, bracket.place, bracket.tasks)
+    else:
+        # just below the orbit at which it lifts off by a line through the last two forces
+        pressed = [(w**2, force.value) for w, force in zip(orbits, forces, strict=True) if force]
+        where = 0.0
+        if len(pressed) >= 2 and arrow.inner is not Case.RR:
+            (a, high), (b, low) = pressed[-2:]
+            where = math.sqrt(b + low * (b - a) / (high - low)) if high > low else 0.0
+        nearer = [where * (1 - part) for part in LATER_ORBITS if where]
+        later = [arrow.task(orbit, times) for orbit in nearer for times in halves]
+        (near,) = yield from asked(later)
+        if isinstance(near, str) or (onset := _onset(near)) is None:
+            chatters = "the contact at the floor opens and closes"
+            yield arrow.missing(f"the run {near}" if isinstance(near, str) else chatters)
+        else:
+            yield arrow.row("lift_onset", 1 / unit, onset, later)
 
 
 @dataclass(frozen=True)
@@ -634,38 +610,9 @@ class Arrow:
         first = [*strays, False].index(False)
         return runs[first : [*strays, True].index(True, first)]
 
-    def search(self, kept: Sequence[Trajectory]) -> Search | None:
-        """A search for the orbit at which the ball leaves the floor out of RR, between the fastest
-        of its orbits at which it presses and the next; None where there are no such two."""
-        presses = [_force(run) is not None for run in kept]
-        if self.inner is not Case.RR or all(presses) or not presses[0]:
-            return None
-        k, orbits = presses.index(False), [float(run.omega_c[0]) for run in kept]
-
-        def task(omega_c: float, bracket: Bracket, attempt: Attempt) -> Task:
-            return self.task(omega_c, attempt.divisor)
-
-        width = self.runner.sampling.thresholds_width * orbits[k]
-        around = Bracket(orbits[k - 1], orbits[k])
-        return Search(around, task, lambda run: _force(run) is not None, width)
-
-    def tasks_near_onset(self, kept: Sequence[Trajectory]) -> list[Task]:
-        """Tasks just below the orbit at which the ball lifts off by a line through the last two
-        forces of the floor; at the fastest orbit where it stays on the floor at all."""
-        if self.inner is Case.RR:
-            return []
-        pressed = [(run.omega_c[0] ** 2, force.value) for run in kept if (force := _force(run))]
-        if kept and len(pressed) == len(kept):
-            fastest = float(kept[-1].omega_c[0])
-            return [self.task(fastest, times) for times in self.runner.sampling.halves]
-        if not 2 <= len(pressed) < len(kept):
-            return []
-        (a, high), (b, low) = pressed[-2:]
-        where = math.sqrt(b + low * (b - a) / (high - low)) if high > low else 0.0
-        orbits = [where * (1 - part) for part in LATER_ORBITS if where]
-        return [
-            self.task(orbit, times) for orbit in orbits for times in self.runner.sampling.halves
-        ]
+    def missing(self, why: str) -> Missing:
+        """A record that it isn't known where the ball leaves the floor, and why."""
+        return self.runner.missing(self.set, f"out of {self.inner.name}: {why}")
 
     def row(
         self, quantity: str, omega_c: float, value: Estimate | float, tasks: Sequence[Task]
@@ -696,9 +643,8 @@ def _load(runner: Runner, runs: Sequence[Trajectory]) -> Estimate | None:
     p, coarse, fine = runs[0].header.parameters, *map(_force, runs)
     if coarse is None or fine is None:
         return None
-    change, weight = fine.value - coarse.value, p.m * p.g
-    best = replace(fine, value=fine.value + change * EXTRAPOLATION)
-    return best.also(time_step=abs(change) * DOUBT, lag=lag_error(runner, p, 2)).times(weight)
+    best = at_zero_step(coarse.value, fine, lag=lag_error(runner, p, 2))
+    return best.times(p.m * p.g)
 
 
 def _onset(runs: Sequence[Trajectory]) -> Estimate | None:
