@@ -16,7 +16,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
@@ -47,33 +47,22 @@ from model import Case, Flow, Parameters, State, Trajectory
 from model.arrays import Array
 
 SET = "hopping"
-TOP = State(y=6.4e-3, omega_c=57.3, slip_x=-106.0)
-"""A state near the top of a hop of the set."""
-
-
-HOLD = 12.0
-"""How long each flow is held, s."""
-MEASURED = 3.0
-"""The last part of a held flow that is measured, s."""
-DISTURBED = 2.0
-"""The first part of it, in which disturbances are not yet linear, s."""
-HOPS_DIVISORS, STEPPED_DIVISORS = (16, 32), (40, 80)
-"""Time steps in a coarse one; by time stepping."""
+TOP = State(y=6.4e-3, omega_c=57.3, slip_x=-106.0)  # near the top of a hop of the set
+# times in s
+HOLD = 12.0  # for which each flow is held
+MEASURED = 3.0  # the last part of it, which is measured
+DISTURBED = 2.0  # the first part of it, in which disturbances are not yet linear
+FOLLOWED = 10.0  # for which a hop is followed at a wall
+LEFT_ALONE = 60.0  # for which it is then left alone
+SWINGING = 24.0  # for which a ball swings
+SWUNG = 4.0  # the last part of it, which is measured
+SAMPLE = 1e-3  # between samples: a parabola through three gives a top to 1e-6 of the height
+PARTS = 128  # times of a swing for which omega_c is averaged
+# time steps in a coarse one
+HOPS_DIVISORS, STEPPED_DIVISORS = (16, 32), (40, 80)  # the latter by time stepping
 FOLLOWED_DIVISORS = 64, 128
 """Those with which a hop is followed. (With those above its end was off by two tolerances: how
 disturbances grow is of no clear order there. Chosen after that was seen.)"""
-SAMPLE = 1e-3
-"""Time between samples, s: a parabola through three gives a top to 1e-6 of the height."""
-FOLLOWED = 10.0
-"""How long a hop is followed at a wall, s."""
-LEFT_ALONE = 60.0
-"""How long it is then left alone, s."""
-SWINGING = 24.0
-"""How long a ball swings, s."""
-SWUNG = 4.0
-"""The last part of a swing that is measured, s."""
-PARTS = 128
-"""Times of a swing for which omega_c is averaged."""
 
 
 def recurrent(runner: Runner, sets: Sets, records: Records) -> Measured:
@@ -94,37 +83,38 @@ def _hopping(runner: Runner, shares: Sequence[float], divisors: tuple[int, int])
     p = Parameters.named(SET)
     flows = [share * p.omega_0 for share in shares]
     lasts, flow = HOLD * len(flows), Flow.staircase(flows, HOLD)
-    pair = StepPair(
-        SET, p, "hops", TOP.stacked(), lasts, divisors, round(lasts / SAMPLE), flow=flow
-    )
-    results = yield from carry_out(runner, [pair])
-    if not results:
-        return
-    (result,) = results
-    heights = []
-    for k, omega_0 in enumerate(flows):
-        q, end = p.replace(omega_0=omega_0), (k + 1) * HOLD
-        coarse, fine = (tops(run, end - MEASURED, end) for run in (result.coarse, result.fine))
-        if min(len(coarse.time), len(fine.time)) < 6:
-            why = f"at omega_0 = {omega_0:.4g} rad/s the ball does not hop any more"
-            yield runner.missing(SET, why)
-            break
-        row = partial(runner.measurement, SET, q, tasks=result.tasks, **fine.conditions(q))
-        for quantity, value in fine.values.items():
-            yield row(quantity=quantity, value=of_no_order(coarse.values[quantity].value, value))
-        if k:
-            begin, last = k * HOLD + DISTURBED, end - MEASURED
-            parts = (result.coarse, begin), (result.fine, begin), (result.fine, begin + DISTURBED)
-            slow, fast, later = (hop_map(tops(run, start, last).x, q)[0] for run, start in parts)
-            factor = of_no_order(slow, estimate(fast, part=abs(fast - later)))
-            why = f"no disturbance is seen to shrink at omega_0 = {omega_0:.4g} rad/s"
-            yield if_found(row(quantity="orbit_multiplier", value=factor), why)
-        heights.append([hops.values["orbit_height"].value for hops in (coarse, fine)])
-    if len(heights) >= 3:
-        coarse_birth, fine_birth = (
-            birth(flows[: len(heights)], each) for each in zip(*heights, strict=True)
-        )
-        yield result.row("orbit_birth", at_zero_step(coarse_birth.value, fine_birth))
+    samples = round(lasts / SAMPLE)
+    pair = StepPair(SET, p, "hops", TOP.stacked(), lasts, divisors, samples, flow=flow)
+    for result in (yield from carry_out(runner, [pair])):
+        heights = []
+        for k, omega_0 in enumerate(flows):
+            q, end, at = p.replace(omega_0=omega_0), (k + 1) * HOLD, f"at {omega_0:.4g} rad/s"
+            coarse, fine = (tops(run, end - MEASURED, end) for run in result.reads)
+            if min(len(coarse.time), len(fine.time)) < 6:
+                yield runner.missing(SET, f"{at} the ball does not hop any more")
+                break
+            row = partial(runner.measurement, SET, q, tasks=result.tasks, **fine.conditions(q))
+            for name, value in fine.values.items():
+                yield row(quantity=name, value=of_no_order(coarse.values[name].value, value))
+            if k:
+                begin, last = k * HOLD + DISTURBED, end - MEASURED
+                coarse_run, run = result.reads
+                parts = (coarse_run, begin), (run, begin), (run, begin + DISTURBED)
+                factors = (hop_map(tops(of, start, last).x, q)[0] for of, start in parts)
+                growth = row(quantity="orbit_multiplier", value=_limit(of_no_order, *factors))
+                yield if_found(growth, f"{at} no disturbance is seen to shrink")
+            heights.append([each.values["orbit_height"].value for each in (coarse, fine)])
+        if len(heights) >= 3:
+            births = [birth(flows[: len(heights)], each) for each in zip(*heights, strict=True)]
+            yield result.row("orbit_birth", at_zero_step(births[0].value, births[1]))
+
+
+def _limit(
+    by: Callable[[float, Estimate], Estimate], coarse: float, fine: float, later: float
+) -> Estimate:
+    """A number for a vanishing step, by what it is with two steps and in a later part of the run
+    with the finer one, which should not differ."""
+    return by(coarse, estimate(fine, part=abs(fine - later)))
 
 
 def with_groups(p: Parameters, kappa: float, Omega_0: float, **others: float) -> Parameters:
@@ -145,15 +135,15 @@ class Hops(NamedTuple):
 
         Means of two parts could agree by chance, because disturbances swing while they die out."""
         span, periods, height = self.time[-1] - self.time[0], np.diff(self.time), self.x[:, 0]
-        turns = np.diff(self.theta)
-        values = {
-            "orbit_period": (span / len(periods), periods),
-            "orbit_omega_c": ((self.theta[-1] - self.theta[0]) / span, turns / periods),
-            "orbit_height": (height.mean(), height),
-        }
+        turn, turns = self.theta[-1] - self.theta[0], np.diff(self.theta)
+
+        def mean(value: float, hops: Array) -> Estimate:
+            return estimate(value, swing=float(np.ptp(hops)) / 2)
+
         return {
-            name: estimate(mean, swing=float(np.ptp(hops)) / 2)
-            for name, (mean, hops) in values.items()
+            "orbit_period": mean(span / len(periods), periods),
+            "orbit_omega_c": mean(turn / span, turns / periods),
+            "orbit_height": mean(height.mean(), height),
         }
 
     def conditions(self, p: Parameters) -> Conditions:
@@ -221,14 +211,17 @@ def followed(runner: Runner, sets: Sets, records: Records) -> Measured:
         both = zip(ahead, FOLLOWED_DIVISORS, strict=True)
         tasks.append([task(q, x, FOLLOWED, divisor) for x, divisor in both])
         (runs,) = runner.groups(tasks[-1:])
-        parts = [] if isinstance(runs, str) else [tops(run, DISTURBED, FOLLOWED) for run in runs]
-        if isinstance(runs, str) or min(len(each.time) for each in parts) < 8:
-            why = f"the run {runs}" if isinstance(runs, str) else "the ball does not hop"
-            yield runner.missing(SET, f"at eta = {q.eta:.4g} {why}")
+        if isinstance(runs, str):
+            yield runner.missing(SET, f"at eta = {q.eta:.4g} the run {runs}")
             return
-        maps = [hop_map(each.x, q) for each in (*parts, tops(runs[1], 2 * DISTURBED, FOLLOWED))]
-        factors.append([factor for factor, _ in maps])
-        steady.append(np.array([state for _, state in maps[:2]]))
+        begun = zip((*runs, runs[1]), (DISTURBED, DISTURBED, 2 * DISTURBED), strict=True)
+        parts = [tops(run, begin, FOLLOWED) for run, begin in begun]
+        if min(len(each.time) for each in parts[:2]) < 8:
+            yield runner.missing(SET, f"at eta = {q.eta:.4g} the ball does not hop")
+            return
+        growths, fixed = zip(*(hop_map(each.x, q) for each in parts), strict=True)
+        factors.append(growths)
+        steady.append(np.array(fixed[:2]))
         if q is walls[-4]:  # disturbances begin to grow at one of the last four walls
             near = parts[1].conditions(q)
     place, used = death(etas[-4:], factors[-4:]), [task for pair in tasks[-4:] for task in pair]
@@ -287,10 +280,9 @@ def death(etas: Sequence[float], factors: Sequence[Sequence[float]]) -> Estimate
 
     Factors (n, 3) are those with the coarser step, with the finer one, and in a later part of the
     run with the finer one."""
-    slow, fast, later = (
-        float(np.polyfit(np.array(each) - 1, etas, 1)[-1]) for each in zip(*factors, strict=True)
-    )
-    return at_zero_step(slow, estimate(fast, part=abs(fast - later)))
+    ways = zip(*factors, strict=True)
+    places = [float(np.polyfit(np.array(each) - 1, etas, 1)[-1]) for each in ways]
+    return _limit(at_zero_step, *places)
 
 
 def swing(runner: Runner, sets: Sets, records: Records) -> Measured:
@@ -300,23 +292,19 @@ def swing(runner: Runner, sets: Sets, records: Records) -> Measured:
     p = sets["reference"].replace(mu=2.5, eta=0.38, c=1.0, omega_0=24.648)
     x0 = State(omega_c=22.39, slip_x=-0.03, slip_z=0.26).stacked()
     pair = StepPair("reference", p, "swing", x0, SWINGING, (60, 80), 12_000)
-    results = yield from carry_out(runner, [pair])
-    if not results:
-        return
-    (result,), end = results, SWINGING - SWUNG
-    if any(np.any(run.case[run.time > end] != Case.SS) for run in (result.coarse, result.fine)):
-        yield runner.missing("reference", "the ball does not slip at both points for ever")
-        return
     # a disturbance that halves in half of the run has left less than it lost since (chosen after
     # the part just before had shown a quarter of that)
-    half = SWINGING / 2 - SWUNG
-    begun = (result.coarse, end), (result.fine, end), (result.fine, half)
-    parts = [_swing(run, start) for run, start in begun]
-    at = state_of(constrained(Case.SS, result.fine.x[-1], p)) | Conditions(period=parts[1][0])
-    names = "swing_period", "swing_omega_c", "swing_size"
-    for name, coarse, fine, before in zip(names, *parts, strict=True):
-        value = at_zero_step(coarse, estimate(fine, part=abs(fine - before)))
-        yield result.row(name, value, **at)
+    end, half = SWINGING - SWUNG, SWINGING / 2 - SWUNG
+    for result in (yield from carry_out(runner, [pair])):
+        coarse, fine = result.reads
+        if any(np.any(run.case[run.time > end] != Case.SS) for run in (coarse, fine)):
+            yield runner.missing("reference", "the ball does not slip at both points for ever")
+            return
+        parts = [_swing(run, start) for run, start in ((coarse, end), (fine, end), (fine, half))]
+        at = state_of(constrained(Case.SS, fine.x[-1], p)) | Conditions(period=parts[1][0])
+        names = "swing_period", "swing_omega_c", "swing_size"
+        for name, *values in zip(names, *parts, strict=True):
+            yield result.row(name, _limit(at_zero_step, *values), **at)
 
 
 def _swing(run: Trajectory, start: float) -> tuple[float, float, float]:
@@ -329,9 +317,8 @@ def _swing(run: Trajectory, start: float) -> tuple[float, float, float]:
     late = (middle - omega_c[k]) / (omega_c[k + 1] - omega_c[k])
     at = time[k] + late * (time[1] - time[0])
     span, turn = at[-1] - at[0], np.diff(np.interp(at[[0, -1]], run.time, run.theta))[0]
-    periods = [
-        np.interp(np.linspace(*ends, PARTS), time, omega_c) for ends in pairwise(at.tolist())
-    ]
+    spans = (np.linspace(*ends, PARTS) for ends in pairwise(at.tolist()))
+    periods = [np.interp(times, time, omega_c) for times in spans]
     return float(span / len(periods)), float(turn / span), float(np.ptp(np.mean(periods, axis=0)))
 
 
@@ -349,13 +336,11 @@ def calm(runner: Runner, sets: Sets, records: Records) -> Measured:
     yield from _hops_at_end(runner, "strong drag", tasks)
     for task, run in zip(tasks, runner.each(tasks), strict=True):
         if not isinstance(run, str) and not hops(run):
-            last = run.omega_c[tail(run)]
+            p, last, case = task.parameters, run.omega_c[tail(run)], settled_case(run).name
             # By chance samples may be the same: no state is known better than a settled one.
-            least = QUANTITIES["omega_c"].resolution * task.parameters.omega_0
+            least = QUANTITIES["omega_c"].resolution * p.omega_0
             end = estimate(last[-1], swing=max(float(np.ptp(last)), least))
-            at = Conditions(case=settled_case(run).name)
-            p = task.parameters
-            yield runner.measurement("strong drag", p, "end_omega_c", end, [task], **at)
+            yield runner.measurement("strong drag", p, "end_omega_c", end, [task], case=case)
 
 
 def _hops_at_end(runner: Runner, set: str, tasks: list[Task]) -> Measured:
@@ -371,15 +356,10 @@ def _hops_at_end(runner: Runner, set: str, tasks: list[Task]) -> Measured:
 def choice(runner: Runner, sets: Sets, records: Records) -> Measured:
     """Case and omega_c of what a ball settles to from rest, in a flow above omega_01."""
     p = sets["reference"]
-    rough = {
-        "rough-floor-1": with_groups(
-            p, 0.1099, 2.635, mu=1.7222, eta=0.0388, j=0.482, r=0.292 * p.R
-        ),
-        "rough-floor-2": with_groups(
-            p, 0.1198, 2.099, mu=1.2277, eta=0.1721, j=0.611, r=0.154 * p.R
-        ),
-    }
-    starts = [Start(name, q, "rest", np.zeros(8)) for name, q in rough.items()]
+    one = {"mu": 1.7222, "eta": 0.0388, "j": 0.482, "r": 0.292 * p.R}
+    two = {"mu": 1.2277, "eta": 0.1721, "j": 0.611, "r": 0.154 * p.R}
+    rough = with_groups(p, 0.1099, 2.635, **one), with_groups(p, 0.1198, 2.099, **two)
+    starts = [Start(f"rough-floor-{k}", q, "rest", np.zeros(8)) for k, q in enumerate(rough, 1)]
     yield from settled_readings(runner, starts[: runner.sampling.choice_sets])
 
 
