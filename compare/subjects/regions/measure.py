@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import islice, zip_longest
@@ -26,10 +26,10 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 from compare.campaign.tasks import Task
-from compare.method.brackets import Attempt, Bracket, Search, narrow
+from compare.method.brackets import Attempt, Bracket, Search
 from compare.method.conditions import Conditions
 from compare.method.protocol import Protocol
-from compare.method.record import Found, Measured, Measurement, Missing, Records, Sets, if_found
+from compare.method.record import Measured, Measurement, Missing, Records, Sets, if_found
 from compare.method.runner import Runner, coarse_step
 from compare.method.scales import time_unit
 from compare.method.settling import (
@@ -51,6 +51,7 @@ from compare.method.statistics import (
     taper,
 )
 from compare.method.step_pairs import constrained
+from compare.method.together import Procedure, narrowed, settled, together
 from compare.plan import Level
 from model import Case, Parameters, State, Trajectory
 from model.arrays import Array
@@ -147,8 +148,6 @@ WIDTHS = 2 * math.sqrt(3)
 """Most by which the places in two brackets of a width differ, in standard uncertainties of one."""
 CLOSING = (0.1, 0.17, 0.26, 0.38)
 """Flows, as parts of the way from omega_02 to omega_04, on the way to where the edge begins."""
-
-
 SWINGS_ON = "on the border the ball swings on: quadratic drag of a slight lag damps next to nothing"
 
 
@@ -165,49 +164,45 @@ def borders(runner: Runner, sets: Sets, records: Records) -> Measured:
         elif holds and folds:
             limits[name] = holds.value, folds.value
         else:
-            why = "at no flow are a slipping ball and a lifted one both settled"
-            yield runner.missing(name, why)
+            yield runner.missing(name, "at no flow are a slipping ball and a lifted one settled")
     at_quick = runner.level is Level.QUICK
     soonest = max(limits, key=lambda name: sets[name].c, default="") if at_quick else ""
-    flows = [
+    edges = list[Edge]()
+    flows = (
         (name, sets[name].replace(omega_0=low + part * (high - low)))
         for name, (low, high) in limits.items()
         for part in (CLOSING if name == soonest else runner.sampling.edge_flows)
-    ]
-    edges = yield from _first_lines(runner, flows)
-    for _ in range(runner.sampling.edge_lines):
-        lines = [edge.with_next_line() for edge in edges]
-        brackets = narrow(runner, [line.search() for line in lines], careful=False)
-        rows = zip(edges, lines, brackets, strict=True)
-        edges = [edge.crossed(line, bracket) for edge, line, bracket in rows]
-    for edge in edges:
-        yield from edge.rows()
+    )
+    yield from together(runner, (_follow(runner, name, p, edges) for name, p in flows))
     for name, (low, high) in limits.items():
         last = low + (max(CLOSING) + 1e-6) * (high - low)
-        near = [edge for edge in edges if edge.moves and edge.set == name and edge.p.omega_0 < last]
+        near = [edge for edge in edges if edge.set == name and edge.p.omega_0 < last]
         if len(near) >= len(CLOSING):
-            yield _where_it_begins(near)
+            yield _where_it_begins(sorted(near, key=lambda edge: edge.p.omega_0))
         elif name == soonest or not at_quick:
-            why = "too few crossings to follow the edge to where it meets the lifted ball"
-            yield runner.missing(name, why)
+            yield runner.missing(name, "too few crossings to follow the edge to the lifted ball")
 
 
-def _first_lines(runner: Runner, flows: Sequence[tuple[str, Parameters]]) -> Found[list[Edge]]:
-    """Edges of sets and flows with the line between the two attractors, as far as these settle."""
-    ways = ("rest", "on the wall")
-    starts = [[initial_condition(name, p, how) for how in ways] for name, p in flows]
-    settled = settle_groups(runner, starts, SettlingCriteria(loose=10.0))
-    edges = []
-    for (name, p), (slipping, lifted) in zip(flows, settled, strict=True):
-        if slipping.settled_in(Case.SS) and lifted.settled_in(Case.NR, Case.SR):
-            # on floor and wall: a lifted ball moves alike at every height
-            a, b = (constrained(Case.SS, state.mean, p) for state in (slipping, lifted))
-            edges.append(Edge(runner, name, p, a, b, a, b - a))
-        else:
-            came_to = ", ".join(state.failure or state.case.name for state in (slipping, lifted))
-            why = f"no two attractors settled at omega_0 = {p.omega_0:.4g} rad/s: {came_to}"
-            yield runner.missing(name, why)
-    return edges
+def _follow(runner: Runner, name: str, p: Parameters, edges: list[Edge]) -> Procedure[None]:
+    """The state on the border at a flow; the edge is added to others if lines crossed it."""
+    starts = [initial_condition(name, p, how) for how in ("rest", "on the wall")]
+    (both,) = yield from settled(starts, criteria=SettlingCriteria(loose=10.0))
+    slipping, lifted = both
+    if not (slipping.settled_in(Case.SS) and lifted.settled_in(Case.NR, Case.SR)):
+        came_to = ", ".join(state.failure or state.case.name for state in both)
+        why = f"no two attractors settled at omega_0 = {p.omega_0:.4g} rad/s: {came_to}"
+        yield runner.missing(name, why)
+        return
+    # on floor and wall: a lifted ball moves alike at every height
+    a, b = (constrained(Case.SS, state.mean, p) for state in both)
+    edge = Edge(runner, name, p, a, b, a, b - a)
+    for _ in range(runner.sampling.edge_lines):
+        line = edge.with_next_line()
+        (bracket,) = yield from narrowed(line.search(), careful=False)
+        edge = edge.crossed(line, bracket)
+    yield from edge.rows()
+    if edge.moves:
+        edges.append(edge)
 
 
 def _where_it_begins(near: Sequence[Edge]) -> Measurement | Missing:
@@ -371,65 +366,44 @@ BEFORE_FOLD = (0.02, 0.035, 0.055, 0.08, 0.12)
 """Distances of flows below omega_02, in parts of the range of slipping."""
 
 
-@dataclass(frozen=True, eq=False)
-class BranchEnd:
-    """How the branch of slipping ends in one drag."""
-
-    lag: float  # 1/c, s, to which the lag by a force is proportional
-    slope: Estimate  # of omega_0 as a function of the floor's force where that vanishes
-    tasks: list[Task]
-
-
 def birth(runner: Runner, sets: Sets, records: Records) -> Measured:
     """The drag at which the fold is born: d omega_0/dA_y of SS is zero at A_y = 0.
 
     The zero of the straight line through the slopes as a function of 1/c."""
-    ranges = {}
-    for name in sets:
-        begins, ends = records.threshold(name, "omega_01"), records.threshold(name, "omega_02")
-        if begins and ends and begins.value < ends.value:
-            ranges[name] = begins.value, ends.value
-    found: dict[str, list[BranchEnd]] = {name: [] for name in ranges}
-    lags: dict[str, Estimate] = {}
-    drags = [(name, kappa / time_unit(sets[name])) for name in ranges for kappa in FIRST_DRAGS]
+    return together(runner, (_birth(runner, name, p, records) for name, p in sets.items()))
+
+
+def _birth(runner: Runner, name: str, p: Parameters, records: Records) -> Procedure[None]:
+    """The drag at which the fold of a set is born."""
+    begins, ends = (records.threshold(name, omega) for omega in ("omega_01", "omega_02"))
+    if not (begins and ends and begins.value < ends.value):
+        yield runner.missing(name, "there is no range of slipping that ends at the wall")
+        return
+    flows = [ends.value - part * (ends.value - begins.value) for part in BEFORE_FOLD]
+    drags = [kappa / time_unit(p) for kappa in FIRST_DRAGS]
+    # 1/c, s, to which the lag by a force is proportional; the slope of omega_0 as a function of the
+    # floor's force where that vanishes
+    lags, slopes, tasks = list[float](), list[Estimate](), list[Task]()
     for _ in (FIRST_DRAGS, NEARER_DRAGS):
-        in_drags = [(name, sets[name].replace(c=c), *ranges[name]) for name, c in drags]
-        for name, end in _branch_ends(runner, in_drags):
-            found[name].append(end)
-        for name, own in found.items():
-            if len(own) >= len(FIRST_DRAGS):
-                lags[name], _ = straight_line([end.lag for end in own], [end.slope for end in own])
-        births = [(name, lag.value) for name, lag in lags.items() if lag.value > 0]
-        drags = [(name, 1 / lag * k) for name, lag in births for k in NEARER_DRAGS]
-    for name, p in sets.items():
-        if name not in ranges:
-            why = "there is no range of slipping at both points that ends at the wall"
-            yield runner.missing(name, why)
-        elif len(found[name]) < len(FIRST_DRAGS) + len(NEARER_DRAGS):
-            why = "too few states of slipping at both points settle near the end of the branch"
-            yield runner.missing(name, why)
-        else:
-            lag = lags[name]
-            drag = replace(lag.times(1 / lag.value**2), value=1 / lag.value)
-            tasks = [task for end in found[name] for task in end.tasks]
-            row = runner.measurement(name, p, "critical_drag", drag, tasks)
-            sure = lag.value > COVERAGE * lag.uncertainty  # else the drag may have no bound
-            yield row if sure else runner.missing(name, "no drag gives birth to a fold")
-
-
-def _branch_ends(
-    runner: Runner, drags: Sequence[tuple[str, Parameters, float, float]]
-) -> Iterator[tuple[str, BranchEnd]]:
-    """By set the ends of branches that settle, from sets and the flows between which they slip."""
-    starts = [
-        starts_at(name, p, "rest", [high - part * (high - low) for part in BEFORE_FOLD])
-        for name, p, low, high in drags
-    ]
-    for (name, p, *_), states in zip(drags, settle_groups(runner, starts), strict=True):
-        if all(state.settled_in(Case.SS) for state in states):
-            flows = np.array([state.start.p.omega_0 for state in states])
-            slope = initial_slope(flows, [state.values["force_Ay"] for state in states])
-            yield name, BranchEnd(1 / p.c, slope, [state.task for state in states])
+        groups = [starts_at(name, p.replace(c=c), "rest", flows) for c in drags]
+        for states in (yield from settled(*groups)):
+            if all(state.settled_in(Case.SS) for state in states):
+                forces = [state.values["force_Ay"] for state in states]
+                at = np.array([state.start.p.omega_0 for state in states])
+                lags.append(1 / states[0].start.p.c)
+                slopes.append(initial_slope(at, forces))
+                tasks += [state.task for state in states]
+        if len(lags) < len(FIRST_DRAGS):
+            break
+        lag, _ = straight_line(lags, slopes)
+        drags = [1 / lag.value * k for k in NEARER_DRAGS if lag.value > 0]
+    if len(lags) < len(FIRST_DRAGS) + len(NEARER_DRAGS):
+        yield runner.missing(name, "too few states of slipping settle near the end of the branch")
+    elif lag.value <= COVERAGE * lag.uncertainty:  # else the drag may have no bound
+        yield runner.missing(name, "no drag gives birth to a fold")
+    else:
+        drag = replace(lag.times(1 / lag.value**2), value=1 / lag.value)
+        yield runner.measurement(name, p, "critical_drag", drag, tasks)
 
 
 PROTOCOLS = (
