@@ -1,8 +1,8 @@
 """Do two results directories hold the same measurements, to the bit? ``python -m tests.same A B
 [PROTOCOL ...]``
 
-A pure refactoring of what measures must leave them so. Which runs a number came from, and what its
-uncertainty is made up of, is not compared."""
+A pure refactoring of what measures must leave them so, each quantity in its order. Which runs a
+number came from, and what its uncertainty is made up of, is not compared."""
 
 from __future__ import annotations
 
@@ -38,7 +38,8 @@ def differences(one: Records, other: Records) -> list[str]:
     found = [] if one.missing == other.missing else ["what is missing, or why"]
     if len(one.measurements) != len(other.measurements):
         return [*found, f"{len(one.measurements)} and {len(other.measurements)} measurements"]
-    for a, b in zip(one.measurements, other.measurements, strict=True):
+    pairs = (sorted(each.measurements, key=lambda m: m.quantity) for each in (one, other))
+    for a, b in zip(*pairs, strict=True):
         names = [
             name
             for name in vars(a)

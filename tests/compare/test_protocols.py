@@ -40,6 +40,7 @@ from compare.method.step_pairs import (
     of_three_steps,
     unlike,
 )
+from compare.method.together import together
 from compare.plan import Level, sets
 from compare.subjects.attractors import measure as attractors
 from compare.subjects.catalogue import CLAIMS
@@ -110,12 +111,12 @@ def test_a_run_that_breaks_down_is_said_and_takes_no_other_with_it(runner, name,
         (
             unsteady.pulsation,
             ROUGH,
-            "no flow was measured at which two-point rolling ends by slipping",
+            "no flow at which two-point rolling ends by slipping",
         ),
         (
             unsteady.jumps,
             ROUGH,
-            "no flows were measured between which the ball slips at both points",
+            "no flows between which the ball slips at both points",
         ),
         (thresholds.measure, P, "ends two-point rolling"),
         (
@@ -155,7 +156,7 @@ def test_a_mean_may_depend_on_more_than_the_state(runner):
     begin = theory.swing(p, a, f, 0.0)[0] - p.omega_0
     runner = replace(runner, level=Level.DEFAULT)
     driven = unsteady.Pulsation(runner, "design-5", p, f, a, reach=1.0, lead=float(begin) / a)
-    (row,) = unsteady.mean_errors(runner, [(driven, a)])
+    (row,) = together(runner, [unsteady.mean_error(driven, a)])
     assert COVERAGE * row.uncertainty > QUANTITIES["mean_error"].resolution * 0.9 * abs(row.value)
 
 

@@ -25,7 +25,7 @@ import numpy.typing as npt
 from numpy.polynomial import Polynomial
 
 from compare.campaign.tasks import Task
-from compare.method.brackets import Attempt, Bracket, Search, narrow
+from compare.method.brackets import Attempt, Bracket, Search
 from compare.method.conditions import Conditions, state_of
 from compare.method.protocol import Protocol
 from compare.method.quantities import QUANTITIES
@@ -42,28 +42,22 @@ from compare.method.step_pairs import (
     constrained,
     of_no_order,
 )
+from compare.method.together import Procedure, asked, narrowed, together
 from model import Case, Contact, Flow, Parameters, State, Trajectory
 from model.arrays import Array
 from model.drag import STOKES
 
-ROLLS_AT = 0.85
-"""Flow of rolling, in units of that at which it ends."""
-SLIPS_AT = 0.3
-"""Flow of slipping, as a part of the way from there to where the wall carries the ball."""
+ROLLS_AT = 0.85  # flow of rolling, in units of that at which it ends
+SLIPS_AT = 0.3  # flow of slipping, as a part of the way from there to where the wall carries
 RAMP = (0.75, 1.35)
 """Ends of a ramp of the flow, as parts of the way to where slipping ends in a jump."""
 JUMP = 1e-3
 """Size of a jump from rolling divided by the flow, and from slipping by a third of the range of
 flows in which it is: the response to a small jump is wanted, and near the ends of that range it is
 far from linear."""
-
-
-RAISED = 1.5
-"""Factor by which the amplitude is raised at a time where the law of drag isn't Stokes'."""
-PERIODS = 3
-"""Of a pulsation in a run."""
-ROUNDS = 5
-"""Successive runs of a driven ball until it is settled, the last with half the step."""
+RAISED = 1.5  # factor by which the amplitude is raised at a time under other laws than Stokes'
+PERIODS = 3  # of a pulsation in a run
+ROUNDS = 5  # successive runs of a driven ball until it is settled, the last with half the step
 LASTING = 5
 """Samples for which slip must last to count: friction may be full for a moment before."""
 PHASES = 8
@@ -72,75 +66,55 @@ STRONG = ((0.25, 4.0), (0.4, 4.0), (0.6, 5.5), (0.75, 4.0))
 """Flows, in units of that at which rolling ends, about which the ball is driven by an amplitude in
 units of the flow: it slips at the wall alone about the slow ones, at both points about the
 others."""
-OCTAVE = 3
-"""Octaves above the lowest frequency at which it is driven so."""
+OCTAVE = 3  # octaves above the lowest frequency at which it is driven so
 
 
 def pulsation(runner: Runner, sets: Sets, records: Records) -> Measured:
     """Gain and phase of rolling; the amplitude at which slip begins; the mean reading beyond it."""
-    small = []  # about a flow at which a ball rolls, at several frequencies
+    driven, strong = list[Procedure[None]](), list[Procedure[None]]()
     for name, p in sets.items():
-        if (rolls := records.threshold(name, "omega_01")) is None:
-            why = "no flow was measured at which two-point rolling ends by slipping"
-            yield runner.missing(name, why)
+        if (end := records.threshold(name, "omega_01")) is None:
+            yield runner.missing(name, "no flow at which two-point rolling ends by slipping")
             continue
-        q = p.replace(omega_0=ROLLS_AT * rolls.value)
-        room, lowest = rolls.value - q.omega_0, _lowest(p)
-        octaves, reach = runner.sampling.pulsation_octaves, runner.sampling.pulsation_reach * room
-        small += [Pulsation(runner, name, q, lowest * 2.0**n, 0.5 * room, reach) for n in octaves]
-    followed = _as_followed(runner, small)
-    for each in followed:
-        if each.failure:
-            yield runner.missing(each.set, f"at {each.frequency:g} Hz {each.failure}")
-            continue
-        gain, lag, sure = abs(each.ratio), -cmath.phase(each.ratio), each.uncertainty
-        size = Conditions(amplitude=each.amplitude)
-        yield each.row("gain", estimate(gain, time_step=sure), each.tasks, **size)
-        yield each.row("phase_lag", estimate(lag, time_step=sure / gain), each.tasks, **size)
-    rolling, slipping = _raised(runner, [each for each in followed if not each.failure]), []
-    brackets = narrow(runner, [each.search() for each in rolling])
-    for each, bracket in zip(rolling, brackets, strict=True):
-        onset = each.onset(bracket)
-        yield onset
-        if isinstance(onset, Missing):
-            continue
-        # The predicted amplitude may be a tenth smaller than the measured one.
-        least = QUANTITIES["slip_amplitude"].resolution * 0.9 * onset.value
-        if COVERAGE * onset.uncertainty <= least:
-            slipping.append((each, 1.5 * onset.value))
-        else:
-            at = f"a pulsation at {each.frequency:g} Hz"
-            why = f"slip in {at} begins at no definite amplitude: no mean reading there"
-            yield runner.missing(each.set, why)
-    strong = [each for name, p in sets.items() for each in _strong(runner, name, p, records)]
-    yield from mean_errors(runner, slipping + strong)
-
-
-def _strong(
-    runner: Runner, name: str, p: Parameters, records: Records
-) -> Iterator[tuple[Pulsation, float]]:
-    """Pulsations by several times the mean flow, under Stokes' law, and amplitudes."""
-    end = records.threshold(name, "omega_01")
-    if end and p.drag == STOKES:
-        frequency = _lowest(p) * 2.0**OCTAVE
-        for share, times in STRONG:
+        q, lowest = p.replace(omega_0=ROLLS_AT * end.value), _lowest(p)
+        room = end.value - q.omega_0
+        for n in runner.sampling.pulsation_octaves:
+            reach = runner.sampling.pulsation_reach * room
+            driven.append(_drive(Pulsation(runner, name, q, lowest * 2.0**n, 0.5 * room, reach)))
+        for share, times in STRONG if p.drag == STOKES else ():
             q = p.replace(omega_0=share * end.value)
-            amplitude = times * q.omega_0
-            yield Pulsation(runner, name, q, frequency, amplitude, amplitude), amplitude
+            a = times * q.omega_0
+            strong.append(mean_error(Pulsation(runner, name, q, lowest * 2.0**OCTAVE, a, a), a))
+    yield from together(runner, driven + strong)
+
+
+def _drive(first: Pulsation) -> Procedure[None]:
+    """How a ball follows a small pulsation, where it slips in larger ones, and its reading then."""
+    each = yield from _followed(first)
+    if each.failure:
+        yield each.missing(each.failure)
+        return
+    gain, lag, sure = abs(each.ratio), -cmath.phase(each.ratio), each.uncertainty
+    size = Conditions(amplitude=each.amplitude)
+    yield each.row("gain", estimate(gain, time_step=sure), each.tasks, **size)
+    yield each.row("phase_lag", estimate(lag, time_step=sure / gain), each.tasks, **size)
+    each = yield from _raised(each)
+    (bracket,) = yield from narrowed(each.search())
+    onset = each.onset(bracket)
+    yield onset
+    if isinstance(onset, Missing):
+        return
+    # The predicted amplitude may be a tenth smaller than the measured one.
+    least = QUANTITIES["slip_amplitude"].resolution * 0.9 * onset.value
+    if COVERAGE * onset.uncertainty <= least:
+        yield from mean_error(each, 1.5 * onset.value)
+    else:
+        yield each.missing("slip begins at no definite amplitude: no mean reading there")
 
 
 def _lowest(p: Parameters) -> float:
     """The lowest frequency of pulsations, Hz: a power of two near c/(4 pi)."""
     return 2.0 ** round(math.log2(0.5 * p.c / (2 * math.pi)))
-
-
-class Timing(NamedTuple):
-    """How a run in a pulsation is done."""
-
-    periods: float
-    samples: int  # in a period
-    divisor: int  # by what the longest time step is divided
-    phase: float = 0.0  # of the flow at the beginning, rad
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,17 +143,26 @@ class Pulsation:
         """The pulsation with a ball whose omega_c is this as a period begins, rad s-1."""
         return replace(self, lead=(omega_c - self.p.omega_0) / self.amplitude)
 
-    def task(self, amplitude: float, x: Array, timing: Timing, largest: float = 0.0) -> Task:
-        """A run from a state; steps in a period, a power of two, suit the `largest` amplitude."""
-        runner = self.runner
-        fastest = 4 * (self.p.omega_0 + max(amplitude, largest)) / self.frequency
-        least = max(
-            runner.sampling.pulsation_steps, 1 / (self.frequency * coarse_step(self.p)), fastest
-        )
-        step = 1 / (self.frequency * 2 ** math.ceil(math.log2(least)) * timing.divisor)
-        flow = Flow.sine(self.p.omega_0, amplitude, self.frequency, timing.phase)
-        samples, t_end = round(timing.samples * timing.periods), timing.periods / self.frequency
-        return runner.task(self.p, x, t_end, step, flow=flow, samples=samples)
+    def task(
+        self,
+        amplitude: float,
+        x: Array,
+        periods: float,
+        samples: int,
+        divisor: int,
+        phase: float = 0.0,
+        largest: float = 0.0,
+    ) -> Task:
+        """A run from a state, with so many samples in a period, and the longest time step divided;
+        the flow begins at a phase, rad.
+
+        Steps in a period, a power of two, suit the `largest` amplitude."""
+        f, least = self.frequency, self.runner.sampling.pulsation_steps
+        fastest = 4 * (self.p.omega_0 + max(amplitude, largest)) / f
+        steps = 2 ** math.ceil(math.log2(max(least, 1 / (f * coarse_step(self.p)), fastest)))
+        step, flow = 1 / (f * steps * divisor), Flow.sine(self.p.omega_0, amplitude, f, phase)
+        count, t_end = round(samples * periods), periods / f
+        return self.runner.task(self.p, x, t_end, step, flow=flow, samples=count)
 
     def search(self) -> Search:
         """A search for the amplitude at which slip begins, in runs of a period and a half."""
@@ -194,26 +177,28 @@ class Pulsation:
             size = self.amplitude
 
         def task(amplitude: float, bracket: Bracket, attempt: Attempt) -> Task:
-            timing = Timing(1.5 * attempt.time, sampling.pulsation_samples, 2 * attempt.divisor)
-            return self.task(amplitude, self.start(amplitude), timing, largest=around.high)
+            x, lasts, divisor = self.start(amplitude), 1.5 * attempt.time, 2 * attempt.divisor
+            samples = sampling.pulsation_samples
+            return self.task(amplitude, x, lasts, samples, divisor, largest=around.high)
 
         return Search(around, task, rolls_on, sampling.pulsation_width * size)
 
     def onset(self, bracket: Bracket) -> Measurement | Missing:
         """The measurement of the amplitude at which slip begins."""
-        at, place = f"a pulsation at {self.frequency:g} Hz", bracket.place
-        low, high = bracket.runs
+        place, (low, high) = bracket.place, bracket.runs
         if low is None or high is None:
-            why = f"in {at} there is slip at no amplitude, or at all"
-            return self.runner.missing(self.set, why)
+            return self.missing("there is slip at no amplitude, or at all")
         alone = np.abs(low.slip_speed_A - low.slip_speed_B)[low.time > low.time[-1] / 6].max()
         if alone > 2e-4 * math.sqrt(self.p.g * self.p.R):
-            why = f"in {at} one contact slips before both do, too little to tell when"
-            return self.runner.missing(self.set, why)
+            return self.missing("one contact slips before both do, too little to tell when")
         # Near the phase at which it sets in, slip lasts for 2 sqrt(2 e) rad beyond the onset by e.
         samples = self.runner.sampling.pulsation_samples
         unseen = (math.pi * LASTING / samples) ** 2 / 2 * place.value
         return self.row("slip_amplitude", place.also(unseen_slip=unseen), bracket.tasks)
+
+    def missing(self, why: str) -> Missing:
+        """A record of what was not measured in this pulsation, and why."""
+        return self.runner.missing(self.set, f"at {self.frequency:g} Hz {why}")
 
     def row(
         self, quantity: str, value: Estimate, tasks: Sequence[Task], **at: Unpack[Conditions]
@@ -231,79 +216,58 @@ class Round(NamedTuple):
     omega_c: float
 
 
-def _settled_rounds(
-    runner: Runner,
-    driven: Sequence[tuple[Pulsation, float]],
-    divisor: int,
-    samples: int,
-    slips: bool,
-) -> list[list[Round] | str]:
-    """Run pulsations until they are settled: of each the last two rounds, the second with half the
-    step, or its error. A ball that slips goes on with the rest of its last state."""
-    states = [each.start(a) for each, a in driven]
-    seen = list[list[Round] | str]([[]] * len(driven))
+def _settle(
+    each: Pulsation, amplitude: float, divisor: int, samples: int, slips: bool
+) -> Procedure[list[Round] | str]:
+    """Run a pulsation until it is settled: the last two rounds, the second with half the step, or
+    why it broke down. A ball that slips goes on with the rest of its last state."""
+    x, rounds = each.start(amplitude), list[Round]()
     for n in range(ROUNDS):
-        finer = runner.sampling.pulsation_divisor if n == ROUNDS - 1 else 1
-        timing = Timing(PERIODS, samples, divisor * finer)
-        todo = [
-            (k, *driven[k], before) for k, before in enumerate(seen) if not isinstance(before, str)
-        ]
-        tasks = [each.task(a, states[k], timing) for k, each, a, _ in todo]
-        for (k, each, a, before), task, run in zip(todo, tasks, runner.each(tasks), strict=True):
-            if isinstance(run, str):
-                seen[k] = f"the run {run}"
-                continue
-            # As the periods begin omega_c goes on as a geometric sequence to its limit, or
-            # diverges.
-            one, two, omega_c = run.omega_c[samples::samples][-3:].tolist()
-            first, second = two - one, omega_c - two
-            omega_c += second * second / (first - second) if abs(second) < abs(first) else 0.0
-            slid = State.of(run.x[-1])._replace(omega_c=omega_c).stacked()
-            states[k] = slid if slips else each.with_omega_c(omega_c).start(a)
-            seen[k] = [*before[-1:], Round(task, run, omega_c)]
-    return seen
+        finer = each.runner.sampling.pulsation_divisor if n == ROUNDS - 1 else 1
+        task = each.task(amplitude, x, PERIODS, samples, divisor * finer)
+        (runs,) = yield from asked([task])
+        if isinstance(runs, str):
+            return f"the run {runs}"
+        (run,) = runs
+        # As the periods begin omega_c goes on as a geometric sequence to its limit, or diverges.
+        one, two, omega_c = run.omega_c[samples::samples][-3:].tolist()
+        first, second = two - one, omega_c - two
+        omega_c += second * second / (first - second) if abs(second) < abs(first) else 0.0
+        slid = State.of(run.x[-1])._replace(omega_c=omega_c).stacked()
+        x = slid if slips else each.with_omega_c(omega_c).start(amplitude)
+        rounds = [*rounds[-1:], Round(task, run, omega_c)]
+    return rounds
 
 
-def _as_followed(runner: Runner, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
-    """Pulsations with omega_c at the beginning of a period as runs show it."""
-    followed, samples = [], runner.sampling.pulsation_samples
-    last, driven = slice(-2 * samples, None), [(each, each.amplitude) for each in pulsations]
-    rounds = _settled_rounds(runner, driven, 2, samples, slips=False)
-    for each, seen in zip(pulsations, rounds, strict=True):
-        if isinstance(seen, str):
-            followed.append(replace(each, failure=seen))
-            continue
-        first, ratio = (
-            complex(2j * np.mean(x * np.exp(-2j * math.pi * each.frequency * t)) / each.amplitude)
-            for t, x in ((run.time[last], run.omega_c[last]) for _, run, _ in seen)
-        )
-        slips = "a ball slips in a pulsation half as large as in a slow one"
-        new = replace(
-            each.with_omega_c(seen[-1].omega_c),
-            ratio=ratio,
-            uncertainty=abs(ratio - first),
-            failure="" if rolls_on(seen[-1].run) else slips,
-            tasks=tuple(task for task, *_ in seen),
-        )
-        followed.append(new)
-    return followed
+def _followed(each: Pulsation) -> Procedure[Pulsation]:
+    """A pulsation with omega_c at the beginning of a period as runs show it."""
+    samples = each.runner.sampling.pulsation_samples
+    seen = yield from _settle(each, each.amplitude, 2, samples, slips=False)
+    if isinstance(seen, str):
+        return replace(each, failure=seen)
+    last, turns = slice(-2 * samples, None), -2j * math.pi * each.frequency
+    first, ratio = (
+        complex(2j * np.mean(run.omega_c[last] * np.exp(turns * run.time[last])) / each.amplitude)
+        for _, run, _ in seen
+    )
+    return replace(
+        each.with_omega_c(seen[-1].omega_c),
+        ratio=ratio,
+        uncertainty=abs(ratio - first),
+        failure="" if rolls_on(seen[-1].run) else "a ball slips half as far as in a slow pulsation",
+        tasks=tuple(task for task, *_ in seen),
+    )
 
 
-def _raised(runner: Runner, pulsations: Sequence[Pulsation]) -> list[Pulsation]:
-    """Pulsations of the largest amplitudes at which the ball rolls, unless Stokes'."""
-    raised = list(pulsations)
-    todo = [k for k, each in enumerate(pulsations) if each.p.drag != STOKES]
-    for _ in range(12):
-        higher = [
-            replace(each, amplitude=RAISED * each.amplitude, lead=each.lead * RAISED**each.power)
-            for each in (raised[k] for k in todo)
-        ]
-        followed = zip(todo, _as_followed(runner, higher), strict=True)
-        still = {k: each for k, each in followed if not each.failure}
-        for k, each in still.items():
-            raised[k] = replace(each, power=math.log(each.lead / raised[k].lead, RAISED))
-        todo = list(still)
-    return raised
+def _raised(each: Pulsation) -> Procedure[Pulsation]:
+    """A pulsation of the largest amplitude at which the ball rolls, unless drag is Stokes'."""
+    for _ in range(0 if each.p.drag == STOKES else 12):
+        lead = each.lead * RAISED**each.power
+        higher = yield from _followed(replace(each, amplitude=RAISED * each.amplitude, lead=lead))
+        if higher.failure:
+            break
+        each = replace(higher, power=math.log(higher.lead / each.lead, RAISED))
+    return each
 
 
 def rolls_on(run: Trajectory) -> bool:
@@ -313,43 +277,39 @@ def rolls_on(run: Trajectory) -> bool:
     return bool(np.convolve(gone, np.ones(LASTING)).max() < LASTING)
 
 
-def mean_errors(runner: Runner, slipping: Sequence[tuple[Pulsation, float]]) -> Measured:
-    """Means over the last period in pulsations, with both steps, once periods repeat.
+def mean_error(each: Pulsation, amplitude: float) -> Procedure[None]:
+    """The mean of omega_c over the last period in a pulsation, with both steps, once periods
+    repeat.
 
     The engine may remember what a state doesn't hold, such as how strongly floor and wall press
     against each other. How much the mean depends on it is seen in periods that start anew from
     states of the last one."""
-    samples = 8 * PHASES
-    rounds = _settled_rounds(runner, slipping, 1, samples, slips=True)
-    anew = [
-        [
-            each.task(a, x, Timing(1, samples, 1, phase=2 * math.pi * k / PHASES))
-            for k, x in enumerate(seen[0].run.x[-1 - samples : -1 : samples // PHASES])
-        ]
-        for (each, a), seen in zip(slipping, rounds, strict=True)
-        if not isinstance(seen, str)
-    ]
-    begun = runner.groups(anew)
-    for (each, amplitude), seen in zip(slipping, rounds, strict=True):
-        at = f"the mean reading at {each.frequency:g} Hz"
-        if isinstance(seen, str) or isinstance(again := next(begun), str):
-            why = f"{at}: {seen if isinstance(seen, str) else f'the run {again}'}"
-            yield runner.missing(each.set, why)
-            continue
-        (_, run, _), (task, halved, _) = seen
-        turns = np.array([period.theta[-1] - period.theta[0] for period in again])
-        before, usual = (np.diff(run.theta[::samples]) * each.frequency)[-2:].tolist()
-        first, mean = (np.diff(halved.theta[::samples]) * each.frequency)[-2:].tolist()
-        value = mean - each.p.omega_0
-        spread = float(np.abs(turns * each.frequency - usual).max())
-        drift = abs(mean - usual) + abs(mean - first) + abs(usual - before) + spread
-        # Slip begins and ends within a coarse step, if there is one: the mean error is uncertain by
-        # half of that part. Both may be of one sign, and are added.
-        within = abs(value) / round(task.steps / PERIODS) if task.settings.timestep else 0.0
-        error = Estimate(value, drift + within, {"drift": drift, "time_step": within})
-        slips = _slips(halved.case[-samples:])
-        row = each.row("mean_error", error, [task], amplitude=amplitude, slips=slips)
-        yield if_found(row, f"{at} is none")
+    samples, f = 8 * PHASES, each.frequency
+    seen = yield from _settle(each, amplitude, 1, samples, slips=True)
+    if isinstance(seen, str):
+        yield each.missing(seen)
+        return
+    (_, run, _), (task, halved, _) = seen
+    states = enumerate(run.x[-1 - samples : -1 : samples // PHASES])
+    phases = ((x, 2 * math.pi * k / PHASES) for k, x in states)
+    anew = [each.task(amplitude, x, 1, samples, 1, phase=phase) for x, phase in phases]
+    (again,) = yield from asked(anew)
+    if isinstance(again, str):
+        yield each.missing(f"the run {again}")
+        return
+    turns = np.array([period.theta[-1] - period.theta[0] for period in again])
+    before, usual = (np.diff(run.theta[::samples]) * f)[-2:].tolist()
+    first, mean = (np.diff(halved.theta[::samples]) * f)[-2:].tolist()
+    value = mean - each.p.omega_0
+    spread = float(np.abs(turns * f - usual).max())
+    drift = abs(mean - usual) + abs(mean - first) + abs(usual - before) + spread
+    # Slip begins and ends within a coarse step, if there is one: the mean error is uncertain by
+    # half of that part. Both may be of one sign, and are added.
+    within = abs(value) / round(task.steps / PERIODS) if task.settings.timestep else 0.0
+    error = Estimate(value, drift + within, {"drift": drift, "time_step": within})
+    slips = _slips(halved.case[-samples:])
+    row = each.row("mean_error", error, [task], amplitude=amplitude, slips=slips)
+    yield if_found(row, f"at {f:g} Hz there is no mean reading")
 
 
 def _slips(cases: npt.NDArray[np.int8]) -> str:
@@ -364,43 +324,37 @@ def _slips(cases: npt.NDArray[np.int8]) -> str:
 
 def jumps(runner: Runner, sets: Sets, records: Records) -> Measured:
     """Delay, peak and height after jumps, rolling and slipping; where a ramp ends slip."""
-    # where slipping begins, the wall carries the ball, a jump ends
-    flows: dict[str, tuple[float, float, float]] = {}
-    # from rest, to settle slipping before a jump or a ramp
-    pairs = list[StepPair]()
-    starts = list[Start]()
+    pairs, slipping = list[StepPair](), list[tuple[Start, float, float]]()
     for name, p in sets.items():
         slips, carries, folds = (records.threshold(name, f"omega_0{n}") for n in (1, 2, 4))
         if slips is None or carries is None:
-            why = "no flows were measured between which the ball slips at both points"
-            yield runner.missing(name, why)
+            yield runner.missing(name, "no flows between which the ball slips at both points")
             continue
-        begins, holds, ends = slips.value, carries.value, folds.value if folds else math.nan
-        flows[name] = begins, holds, ends
+        begins, holds = slips.value, carries.value
         if p.drag == STOKES:  # with other laws the delay depends on the size of the jump
             q = p.replace(omega_0=ROLLS_AT * begins)
             rolls = Start(name, q, "RR", State(omega_c=q.omega_0).stacked())
             pairs.append(_jump(runner, rolls, JUMP * q.omega_0))
+        # from rest, to settle slipping before a jump or a ramp, between two flows
         q = p.replace(omega_0=begins + SLIPS_AT * (holds - begins))
-        starts.append(Start(name, q, "jump", np.zeros(8)))
+        slipping.append((Start(name, q, "SS", np.zeros(8)), begins, holds))
         if folds is None:
-            why = "no flow was measured at which slipping at both points ends in a jump"
-            yield runner.missing(name, why)
+            yield runner.missing(name, "no flow at which slipping at both points ends in a jump")
         else:
-            q = p.replace(omega_0=begins + RAMP[0] * (ends - begins))
-            starts.append(Start(name, q, "ramp", np.zeros(8)))
-    for start, state in zip(starts, settle(runner, starts), strict=True):
-        if state.failure or state.case is not Case.SS:
+            q = p.replace(omega_0=begins + RAMP[0] * (folds.value - begins))
+            slipping.append((Start(name, q, "ramp", np.zeros(8)), begins, folds.value))
+    states = settle(runner, [start for start, *_ in slipping])
+    for (start, begins, ends), state in zip(slipping, states, strict=True):
+        if not state.settled_in(Case.SS):
             why = state.failure or state.case.name
             yield runner.missing(start.set, f"no settled slipping to start from: {why}")
             continue
-        begins, holds, ends = flows[start.set]
         # At both walls to the last digit.
         begun = replace(start, x0=constrained(Case.SS, state.mean, start.p))
-        if start.name == "jump":
-            pairs.append(_jump(runner, replace(begun, name="SS"), JUMP / 3 * (holds - begins)))
-        else:
+        if start.name == "ramp":
             pairs += _ramps(runner, begun, begins, ends)
+        else:
+            pairs.append(_jump(runner, begun, JUMP / 3 * (ends - begins)))
     for result in (yield from carry_out(runner, pairs)):
         yield from _rows(result)
 
@@ -417,8 +371,7 @@ def _rows(result: StepPairResult) -> Measured:
     elif math.isfinite(coarse) and math.isfinite(fine):
         yield result.row("ramp_end", at_zero_step(coarse, estimate(fine)))
     else:
-        ramp = f"a ramp of {pair.at['rate']:.3g} rad/s^2"
-        yield result.missing(f"{ramp} doesn't end slipping at both points")
+        yield result.missing(f"a ramp of {pair.at['rate']:.3g} rad/s^2 doesn't end slipping")
 
 
 def _jump(runner: Runner, start: Start, size: float) -> StepPair:
@@ -473,11 +426,9 @@ def _highest(t: Array, y: Array) -> tuple[float, float]:
     """Time and height of the highest peak of samples (n,) in their first half; nan without one."""
     k, later = peaks(y)
     highest = (k == y.argmax()) & (k < len(t) // 2)
-    at, height = (
-        np.append(each[highest], math.nan)[0]
-        for each in (t[k] + later * (t[1] - t[0]), top(y, k, later))
-    )
-    return float(at), float(height)
+    found = t[k] + later * (t[1] - t[0]), top(y, k, later)
+    at, height = (float(np.append(each[highest], math.nan)[0]) for each in found)
+    return at, height
 
 
 def caught_up(run: Trajectory) -> float:
