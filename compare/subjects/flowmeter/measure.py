@@ -32,6 +32,7 @@ from compare.method.scales import time_unit
 from compare.method.settling import SettlingCriteria, SteadyState
 from compare.method.statistics import Estimate, estimate, settled_case, uniform
 from compare.method.step_pairs import Start, StepPair, StepPairResult, carry_out
+from compare.method.together import Procedure, asked, settled, together
 from model import Case, Flow, Parameters, State, Trajectory
 from model.trajectory import columns
 
@@ -41,30 +42,17 @@ NEIGHBOURS = (-1e-3, -5e-4, 5e-4, 1e-3)
 """The same from a settled state; the nearer ones show the effect of curvature."""
 
 
+SHARP = {"neighbours": 0.3, "jump": 0.1, "mean": 1.0}
+"""How slopes are found, and a factor on the drift limit of the states: for the jump they lie close
+together."""
+
+
 def slope(runner: Runner, sets: Sets, records: Records) -> Measured:
     """Slopes at settled states, the jump where slip sets in, the mean to unloading."""
     most = runner.sampling.slope_slipping
     curves = [curve for name, p in sets.items() for curve in _curves(name, p, records, most)]
-    # With a factor on the drift limit of settled states: for the jump they lie close together.
-    for by, sharp in ("neighbours", 0.3), ("jump", 0.1), ("mean", 1.0):
-        own = [curve for curve in curves if curve.by == by]
-        starts = [
-            [Start(c.set, c.p.replace(omega_0=flow), by, c.x0.stacked()) for flow in c.flows]
-            for c in own
-        ]
-        settled = settling.settle_groups(runner, starts, SettlingCriteria(span=24.0, sharp=sharp))
-        for curve, states in zip(own, settled, strict=True):
-            where = f"{by} at omega_0 = {curve.p.omega_0:.4g} rad/s"
-            if failure := next((each.failure for each in states if each.failure), ""):
-                yield runner.missing(curve.set, f"{where}: {failure}")
-            elif value := _slope(curve, states):
-                tasks, at = [s.task for s in states], Conditions(case=states[-1].case.name, by=by)
-                row = runner.measurement(curve.set, curve.p, "slope", value, tasks, **at)
-                yield if_found(row, f"{where}: no slope")
-            else:
-                cases = ", ".join(each.case.name for each in states)
-                why = f"{where}: the states there are not of one kind ({cases})"
-                yield runner.missing(curve.set, why)
+    in_order = (_join(runner, curve) for by in SHARP for curve in curves if curve.by == by)
+    return together(runner, in_order)
 
 
 @dataclass(frozen=True)
@@ -78,6 +66,23 @@ class Curve:
     x0: State = State()
     # standard uncertainty of the flow at which slipping sets in, and of others measured so, rad s-1
     noise: float = 0.0
+
+
+def _join(runner: Runner, c: Curve) -> Procedure[None]:
+    """The slope of a curve."""
+    starts = [Start(c.set, c.p.replace(omega_0=flow), c.by, c.x0.stacked()) for flow in c.flows]
+    criteria = SettlingCriteria(span=24.0, sharp=SHARP[c.by])
+    (states,) = yield from settled(starts, criteria=criteria)
+    where = f"{c.by} at omega_0 = {c.p.omega_0:.4g} rad/s"
+    if failure := next((each.failure for each in states if each.failure), ""):
+        yield runner.missing(c.set, f"{where}: {failure}")
+    elif value := _slope(c, states):
+        tasks, at = [s.task for s in states], Conditions(case=states[-1].case.name, by=c.by)
+        row = runner.measurement(c.set, c.p, "slope", value, tasks, **at)
+        yield if_found(row, f"{where}: no slope")
+    else:
+        cases = ", ".join(each.case.name for each in states)
+        yield runner.missing(c.set, f"{where}: the states there are not of one kind ({cases})")
 
 
 def _curves(name: str, p: Parameters, records: Records, most: int) -> Iterator[Curve]:
@@ -152,37 +157,32 @@ def _slope(curve: Curve, states: Sequence[SteadyState]) -> Estimate | None:
 
 def hysteresis(runner: Runner, sets: Sets, records: Records) -> Measured:
     """Case and omega_c at every level of the loop, and the case at the level before."""
-    loops: dict[str, list[Start]] = {}  # starts at all levels of a set, up and down
-    for name, p in sets.items():
-        if rise := _levels(name, records, runner.sampling.hysteresis_parts):
-            sides = [("up", flow) for flow in rise] + [("down", flow) for flow in rise[-2::-1]]
-            starts = ((p.replace(omega_0=flow), side) for side, flow in sides)
-            loops[name] = [Start(name, q, side, np.zeros(8)) for q, side in starts]
-        else:
-            why = "no flow at which SS gives way to NR"
-            yield runner.missing(name, why)
-    tasks = [_loop_task(runner, loop) for loop in loops.values()]
-    for (name, loop), task, run in zip(loops.items(), tasks, runner.each(tasks), strict=True):
-        if isinstance(run, str):
-            yield runner.missing(name, f"the run {run}")
-            continue
-        # By how much half the step changes omega_c, relative to omega_0: the largest of all settled
-        # states.
-        certainty = max(
-            m.uncertainty / m.parameters.omega_0
-            for m in records.select("settled", "omega_c")
-            if m.set == name and m.parameters.omega_0 > 0
-        )
-        yield from _loop_rows(runner, loop, task, run, certainty)
+    return together(runner, (_loop(runner, name, p, records) for name, p in sets.items()))
 
 
-def _loop_task(runner: Runner, loop: Sequence[Start]) -> Task:
-    """A run through all levels of a loop, each held for a time."""
-    p, flows = loop[0].p, [level.p.omega_0 for level in loop]
-    step, hold = coarse_step(p), settling.duration(p, runner.sampling.hysteresis_hold)
+def _loop(runner: Runner, name: str, p: Parameters, records: Records) -> Procedure[None]:
+    """A run through all levels of the loop of a set, up and down, each held for a time."""
+    rise = _levels(name, records, runner.sampling.hysteresis_parts)
+    if not rise:
+        yield runner.missing(name, "no flow at which SS gives way to NR")
+        return
+    sides = [("up", flow) for flow in rise] + [("down", flow) for flow in rise[-2::-1]]
+    loop = [Start(name, p.replace(omega_0=flow), side, np.zeros(8)) for side, flow in sides]
+    first, flows = loop[0].p, [flow for _, flow in sides]
+    step, hold = coarse_step(first), settling.duration(first, runner.sampling.hysteresis_hold)
     samples = round(hold / (settling.STEPS_A_SAMPLE * step)) * len(flows)
     flow, x0, lasts = Flow.staircase(flows, hold), State(omega_c=flows[0]), hold * len(flows)
-    return runner.task(p, x0, lasts, step, flow=flow, samples=samples)
+    task = runner.task(first, x0, lasts, step, flow=flow, samples=samples)
+    (runs,) = yield from asked([task])
+    if isinstance(runs, str):
+        yield runner.missing(name, f"the run {runs}")
+        return
+    # By how much half the step changes omega_c, relative to omega_0: the largest of all settled
+    # states.
+    states = records.select("settled", "omega_c", lambda m: m.set == name)
+    moving = (m for m in states if m.parameters.omega_0 > 0)
+    certainty = max(m.uncertainty / m.parameters.omega_0 for m in moving)
+    yield from _loop_rows(runner, loop, task, runs[0], certainty)
 
 
 def _loop_rows(
@@ -227,22 +227,11 @@ def _levels(name: str, records: Records, parts: int) -> list[float]:
     return sorted(levels)
 
 
-@dataclass(frozen=True)
-class Shown:
-    """A quantity that a pair of unloading shows at an event, by names."""
-
-    pair: str
-    quantity: str
-    event: str
-
-
-LANDING = "unloading until it lands"
-UNLOADED = "unloading"
-UPWARDS = "push upwards"
-BY_SPIN = "push by spin"
-"""Names of the pairs."""
-
-
+LANDING, UNLOADED = "unloading until it lands", "unloading"
+UPWARDS, BY_SPIN = "push upwards", "push by spin"
+"""Names of pairs."""
+Shown = dict[tuple[str, str], Estimate]
+"""What a run shows, by quantity and event."""
 UNLOADED_FROM = 1.02
 """Flow before the unloading, in units of the measured omega_02."""
 UNLOADED_TO = 0.95
@@ -256,8 +245,7 @@ def unloading(runner: Runner, sets: Sets, records: Records) -> Measured:
     starts, pairs = [], []
     for name, p in sets.items():
         if (limit := records.threshold(name, "omega_02")) is None:
-            why = "no flow was measured that is the least to hold a ball on the wall"
-            yield runner.missing(name, why)
+            yield runner.missing(name, "no flow that is the least to hold a ball on the wall")
             continue
         # A pushed ball must neither sink nor roll again: the flow is above the end of rolling by
         # lifting, too.
@@ -268,11 +256,10 @@ def unloading(runner: Runner, sets: Sets, records: Records) -> Measured:
     for states in settling.settle_groups(runner, starts, criteria):
         for state, names in zip(states, ((LANDING, UNLOADED), (UPWARDS, BY_SPIN)), strict=True):
             if state.failure:
-                why = f"no ball to begin with on the wall: {state.failure}"
-                yield runner.missing(state.start.set, why)
+                yield runner.missing(state.start.set, f"no ball on the wall: {state.failure}")
             else:
                 pairs += [_pair(runner, state, name) for name in names]
-    kinds: dict[Shown, list[tuple[StepPairResult, Estimate, float]]] = {}
+    kinds: dict[tuple[str, str, str], list[tuple[StepPairResult, Estimate, float]]] = {}
     for result in (yield from carry_out(runner, pairs)):
         name, (before, coarse), (case, fine) = result.pair.name, result.coarse, result.fine
         if name != LANDING and before is case:
@@ -282,16 +269,16 @@ def unloading(runner: Runner, sets: Sets, records: Records) -> Measured:
         if coarse.keys() != fine.keys() or (name == LANDING and not fine):
             yield result.missing(f"{name}: the ball does not slip and land")
             continue
-        for number, value in fine.items():
-            change = abs(coarse[number].value / value.value - 1)
-            kinds.setdefault(number, []).append((result, value, change))
-    for number, alike in kinds.items():
+        for shown, value in fine.items():
+            change = abs(coarse[shown].value / value.value - 1)
+            kinds.setdefault((name, *shown), []).append((result, value, change))
+    for (name, quantity, event), alike in kinds.items():
         # The difference may be small by chance: at least the median of all pairs counts.
         usual = float(np.median([change for *_, change in alike]))
         for result, fine, change in alike:
             value = fine.also(time_step=uniform(max(change, usual) * abs(fine.value)))
-            row = result.row(number.quantity, value, event=number.event)
-            yield if_found(row, f"{number.pair}: no {number.quantity}")
+            row = result.row(quantity, value, event=event)
+            yield if_found(row, f"{name}: no {quantity}")
 
 
 def _pair(runner: Runner, state: SteadyState, name: str) -> StepPair:
@@ -313,16 +300,16 @@ def _pair(runner: Runner, state: SteadyState, name: str) -> StepPair:
     t_end = settling.rounded_duration(p, lands if name == LANDING else 6.0)
     step = coarse_step(p) / fine
 
-    def read(run: Trajectory) -> tuple[Case, dict[Shown, Estimate]]:
-        numbers = {}
+    def read(run: Trajectory) -> tuple[Case, Shown]:
+        numbers = Shown()
         if name == LANDING:
             numbers = _landed(run)
         elif name == UPWARDS:  # it falls on the floor soon after
-            numbers = {Shown(name, "lift", "first top"): first_top(run)}
+            numbers = {("lift", "first top"): first_top(run)}
         elif name == BY_SPIN:
             # it leaves the floor at a whole step, up to one late or early, which changes its height
             late = step / 2 * float(run.v_y.max())
-            numbers = {Shown(name, "lift", "end"): estimate(run.y[-1], sampling=uniform(late))}
+            numbers = {("lift", "end"): estimate(run.y[-1], sampling=uniform(late))}
         return settling.physical_case(settled_case(run)), numbers
 
     at = Conditions(start=name, duration=t_end) | state_of(x0.stacked())
@@ -331,7 +318,7 @@ def _pair(runner: Runner, state: SteadyState, name: str) -> StepPair:
     return replace(pair, at=at)
 
 
-def _landed(run: Trajectory) -> dict[Shown, Estimate]:
+def _landed(run: Trajectory) -> Shown:
     """Onset of slip, and landing: time, speed, vertical impulse. Empty without one."""
     p, step = run.header.parameters, float(run.time[1] - run.time[0])
     slip = run.slip_speed_B / math.sqrt(p.g * p.R)
@@ -351,10 +338,10 @@ def _landed(run: Trajectory) -> dict[Shown, Estimate]:
     sampling = step / math.sqrt(12)
     slips = estimate(cubic, degree=uniform(abs(cubic - quadratic)), sampling=sampling)
     return {
-        Shown(LANDING, "time", "slip at B"): slips,
-        Shown(LANDING, "time", "landing"): estimate(run.time[k] + wait, sampling=sampling),
-        Shown(LANDING, "landing_speed", "landing"): Estimate(v_y, 0.0),
-        Shown(LANDING, "landing_impulse", "landing"): impulse,
+        ("time", "slip at B"): slips,
+        ("time", "landing"): estimate(run.time[k] + wait, sampling=sampling),
+        ("landing_speed", "landing"): Estimate(v_y, 0.0),
+        ("landing_impulse", "landing"): impulse,
     }
 
 
