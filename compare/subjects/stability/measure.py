@@ -47,6 +47,7 @@ from compare.method.statistics import (
     uniform,
 )
 from compare.method.step_pairs import Start, unlike
+from compare.method.together import Procedure, asked, together
 from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
@@ -55,6 +56,8 @@ from model.kinematics import SLIP_XYZ, VARIABLES, slip_speeds, state_units
 
 PUSH_RECORD = (64, 256)
 """Of what follows a push: its length in coarse steps, about 3 sqrt(R/g), and samples."""
+PUSH = {Case.RS: 0.3, Case.SR: 0.1}
+"""Size of a push, in the `units`, where it is extrapolated to zero from this and half of it."""
 USUAL_PUSH = 2e-4
 """Size of a push that isn't extrapolated to zero, under Stokes' law of drag. The run with the
 coarser step has half of it, and shows that it doesn't matter."""
@@ -67,10 +70,6 @@ SLOWEST_SLIP = 0.04
 """Least slip speed of a state divided by sqrt(g R): a push is to be small beside it."""
 ZERO_RATE = 0.05
 """Measured rates below this share of the drag coefficient c count as zero."""
-
-
-PUSH = {Case.RS: 0.3, Case.SR: 0.1}
-"""Size of a push, in the `units`, where it is extrapolated to zero from this and half of it."""
 STATES = {Case.RR: 1, Case.SR: 2, Case.SS: 2, Case.NR: 1, Case.NS: 1}
 """Most states of a case and set at the quick level, spread over the flows; more at the others."""
 NOT_LINEAR = (
@@ -84,31 +83,7 @@ def measure(runner: Runner, sets: Sets, records: Records) -> Measured:
     pushed = list[Pushed]()
     for name, p in sets.items():
         pushed += yield from chosen_states(runner, records, name, p)
-    for each in pushed:
-        if each.too_hard:
-            yield each.missing(NOT_LINEAR, 2 * len(each.active) + len(each.active) ** 2)
-    states = [each for each in pushed if not each.too_hard]
-    tasks = [state.tasks() for state in states]
-    for state, own, runs in zip(states, tasks, runner.groups(tasks), strict=True):
-        if isinstance(runs, str):
-            yield state.missing(f"a run {runs}")
-            continue
-        count = 2 * len(state.active)
-        answers = [
-            push_response(state, size, runs[k * count : (k + 1) * count])
-            for k, size in enumerate(state.sizes)
-        ]
-        # An almost unloaded floor follows its load less exactly. (48 was 32 before rates by
-        # shorter records had been seen to be off.)
-        if min(map(len, answers)) < (48 if state.case is Case.SR else 8):
-            yield state.missing("pushed, the ball doesn't stay in this case")
-            continue
-        (_, step), start = state.steps, state.start
-        at = Conditions(case=state.case.name) | state_of(start.x0)
-        row = partial(runner.measurement, start.set, start.p, tasks=own[-count:], **at)
-        modes = spectrum(state, answers, step)
-        yield from _modes(state, modes, step, row)
-        yield from _responses(state, answers, row)
+    yield from together(runner, (each.answer() for each in pushed))
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,9 +140,8 @@ class Pushed:
     def steps(self) -> tuple[float, float]:
         """The longer and the shorter time step, s."""
         sampling, step = self.runner.sampling, coarse_step(self.start.p)
-        of_SR = self.case is Case.SR
-        coarse, fine = sampling.rates_SR if of_SR else sampling.rates_divisors
-        return step / coarse, step / fine
+        divisors = sampling.rates_SR if self.case is Case.SR else sampling.rates_divisors
+        return step / divisors[0], step / divisors[1]
 
     @property
     def too_hard(self) -> bool:
@@ -184,14 +158,36 @@ class Pushed:
         p, x = self.start.p, self.start.x0
         turned = math.sqrt(p.g * p.R) * max(SLOWEST_SLIP, 2 * PUSH.get(self.case, 0.0))
         loads = (p.mu, p.g), (p.eta, p.R * State.of(x).omega_c ** 2)
+        contacts = zip(self.case.name, slip_speeds(x, p), loads, strict=True)
         return all(
             max(turned, 4 * coarse_step(p) * friction * load) < speed
             and friction * speed < 10 * STUDY_SLIP * load / p.g
-            for contact, speed, (friction, load) in zip(
-                self.case.name, slip_speeds(x, p), loads, strict=True
-            )
+            for contact, speed, (friction, load) in contacts
             if contact == "S"
         )
+
+    def answer(self) -> Procedure[None]:
+        """The exponents of the state, and how it answers each push."""
+        if self.too_hard:
+            yield self.missing(NOT_LINEAR, 2 * len(self.active) + len(self.active) ** 2)
+            return
+        tasks, count, (_, step) = self.tasks(), 2 * len(self.active), self.steps
+        (runs,) = yield from asked(tasks)
+        if isinstance(runs, str):
+            yield self.missing(f"a run {runs}")
+            return
+        pushes = zip(self.sizes, range(0, len(runs), count), strict=True)
+        answers = [push_response(self, size, runs[k : k + count]) for size, k in pushes]
+        # An almost unloaded floor follows its load less exactly. (48 was 32 before rates by
+        # shorter records had been seen to be off.)
+        if min(map(len, answers)) < (48 if self.case is Case.SR else 8):
+            yield self.missing("pushed, the ball doesn't stay in this case")
+            return
+        start, own = self.start, tasks[-count:]
+        at = Conditions(case=self.case.name) | state_of(start.x0)
+        row = partial(self.runner.measurement, start.set, start.p, tasks=own, **at)
+        yield from _modes(self, spectrum(self, answers, step), step, row)
+        yield from _responses(self, answers, row)
 
     def tasks(self) -> list[Task]:
         """Runs for each of the `sizes`: every active variable is pushed, up and down."""
@@ -240,10 +236,9 @@ def chosen_states(
     if p.drag == QUADRATIC:
         q, x = p.replace(omega_0=0.5 / unit), State(omega_c=0.5 / unit)
         states.append(Pushed(runner, Start(name, q, "settled", x.stacked()), Case.RR))
+    states.sort(key=lambda each: each.start.p.omega_0)
     for case, most in STATES.items():
-        of = sorted(
-            (each for each in states if each.case is case), key=lambda each: each.start.p.omega_0
-        )
+        of = [each for each in states if each.case is case]
         alike = [state for state in of if state.fast]
         if case is Case.SR:  # in the fastest flows the floor is unloaded within a few samples
             alike = alike[: math.ceil(2 / 3 * len(alike))]
@@ -251,8 +246,7 @@ def chosen_states(
         places = {int((k + 0.5) * len(alike) / count) for k in range(count)} if alike else set()
         chosen += [alike[k] for k in sorted(places)]
         if (lacking := min(count, len(of)) - len(places)) > 0 or not of:
-            why = f"{len(alike)} of {len(of)} settled states of {case.name} slip fast enough for a "
-            why += "push"
+            why = f"{len(alike)} of {len(of)} states of {case.name} slip fast enough for a push"
             yield runner.missing(name, why, max(lacking, 0) * 2 * len(TRAITS[case].active))
     return chosen
 
@@ -264,10 +258,8 @@ def push_response(state: Pushed, size: float, runs: Sequence[Trajectory]) -> Arr
     without the first sample: forces build up then."""
     ups, downs = runs[::2], runs[1::2]
     if state.case is Case.SR:
-        seen = [
-            max(pair, key=lambda run: stays(run, state.case))
-            for pair in zip(ups, downs, strict=True)
-        ]
+        pairs = zip(ups, downs, strict=True)
+        seen = [max(pair, key=lambda run: stays(run, state.case)) for pair in pairs]
         columns = [(1 if run in ups else -1) * (run.x - state.start.x0) for run in seen]
     else:
         # Where the wall carries nothing, as beside a ball that only spins, its contact is not
@@ -275,10 +267,8 @@ def push_response(state: Pushed, size: float, runs: Sequence[Trajectory]) -> Arr
         seen = list(runs[:2] if state.case is Case.RS else runs)
         columns = [(up.x - down.x) / 2 for up, down in zip(ups, downs, strict=True)]
     D = np.stack(columns, axis=-1)[:, state.active] / (size * state.units[:, None])
-    ends = [stays(run, state.case) for run in seen]
-    ends.append(
-        int(np.argmax(np.append(size * np.abs(D).max(axis=(1, 2)) > 0.4 * (1 + 1e-9), True)))
-    )
+    far = size * np.abs(D).max(axis=(1, 2)) > 0.4 * (1 + 1e-9)
+    ends = [*(stays(run, state.case) for run in seen), int(np.argmax(np.append(far, True)))]
     return np.asarray(D[1 : min(ends)])
 
 
@@ -366,9 +356,8 @@ def _modes(state: Pushed, modes: Spectrum, step: float, row: Row) -> Measured:
     # They come from one propagator: where one is too vague for a check, the others aren't to be
     # trusted more.
     sure = modes.uncertainty.tolist()
-    vague = max(
-        COVERAGE * sure[k] / size / quantity(name).resolution for name, *_, size, k in parts
-    )
+    powers = (COVERAGE * sure[k] / size / quantity(name).resolution for name, *_, size, k in parts)
+    vague = max(powers)
     decays = [part for part in parts if part[0] == "decay_rate" and part[2] > ZERO_RATE * p.c]
     if decays:
         parts.append(("slowest_decay", *min(decays, key=lambda part: part[2])[1:]))

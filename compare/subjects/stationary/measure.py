@@ -29,15 +29,14 @@ from model.drag import QUADRATIC
 
 def measure(runner: Runner, sets: Sets, records: Records) -> Measured:
     """The case that every start ends in, and once for every distinct state its values."""
-    sharp = runner.sampling.settled_sharp
-    alike: dict[Attractor, list[SteadyState]] = {}
-    without: dict[Attractor, Missing] = {}
-    starts = []
+    sharp, starts = runner.sampling.settled_sharp, []
     for name, p in sets.items():
         for how, flows in runner.sampling.settled_starts:
             starts += settling.starts_at(name, p, how, [flow / time_unit(p) for flow in flows])
         spinning = State(slip_y=settling.SPIN / time_unit(p) * p.R / p.r)
         starts.append(Start(name, p.replace(omega_0=0.0), "spinning", spinning.stacked()))
+    alike: dict[Attractor, list[SteadyState]] = {}
+    without: dict[Attractor, Missing] = {}
     criteria = SettlingCriteria(sharp=sharp, loose=runner.sampling.settled_loose)
     for state in settling.settle(runner, starts, criteria):
         if state.failure:
@@ -95,13 +94,9 @@ def _values(runner: Runner, same: Sequence[SteadyState], fine: SteadyState) -> M
     for group in settling.ERROR_GROUPS:
         shown = [n for n in group if all(n in each.values for each in (fine, *same))]
         sizes = [quantity(n).size(p) for n in shown]
-        changes = [
-            max(abs(s.values[n].value - fine.values[n].value) for s in same) / size
-            for n, size in zip(shown, sizes, strict=True)
-        ]
-        for n, size, change in zip(shown, sizes, unlike(np.array(changes)), strict=True):
-            off = float(change) * size
-            sure = settling.with_changes(fine.values[n], off, p, size, divisor)
+        off = [max(abs(s.values[n].value - fine.values[n].value) for s in same) for n in shown]
+        for n, size, change in zip(shown, sizes, unlike(np.divide(off, sizes)), strict=True):
+            sure = settling.with_changes(fine.values[n], float(change) * size, p, size, divisor)
             yield _row(runner, fine, n, sure)
 
 
