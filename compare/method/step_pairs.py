@@ -4,7 +4,7 @@ through records of a few steps, which give values and rates of change."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Unpack
 
@@ -83,24 +83,37 @@ class StepPairResult:
         return self.runner.missing(self.pair.set, why, self.pair.rows)
 
 
-def carry_out(runner: Runner, pairs: Iterable[StepPair]) -> Found[list[StepPairResult]]:
+def results_of(runner: Runner, pairs: Sequence[StepPair]) -> Iterator[StepPairResult | Missing]:
     """Run all pairs, and read each; those of which a run broke down are missing."""
-    tasks: list[tuple[StepPair, list[Task]]] = []
-    for pair in pairs:
-        tasks.append((pair, []))
-        for step in (coarse_step(pair.p) / divisor for divisor in pair.divisors):
-            samples = pair.samples or round(pair.t_end / step)
-            for one in pair.together or (pair,):
-                task = runner.task(one.p, one.x0, pair.t_end, step, flow=one.flow, samples=samples)
-                tasks[-1][1].append(task)
-    results = []
-    for (pair, own), runs in zip(tasks, runner.groups([own for _, own in tasks]), strict=True):
+    tasks = [_tasks(runner, pair) for pair in pairs]
+    for pair, own, runs in zip(pairs, tasks, runner.groups(tasks), strict=True):
         if isinstance(runs, str):
             yield runner.missing(pair.set, f"{pair.name}: the run {runs}", pair.rows)
         else:
             each = len(runs) // len(pair.divisors)
             reads = [pair.read(*runs[k : k + each]) for k in range(0, len(runs), each)]
-            results.append(StepPairResult(runner, pair, own, reads))
+            yield StepPairResult(runner, pair, own, reads)
+
+
+def _tasks(runner: Runner, pair: StepPair) -> list[Task]:
+    """The runs of a pair, those with the coarsest step first."""
+    tasks = []
+    for step in (coarse_step(pair.p) / divisor for divisor in pair.divisors):
+        samples = pair.samples or round(pair.t_end / step)
+        for one in pair.together or (pair,):
+            task = runner.task(one.p, one.x0, pair.t_end, step, flow=one.flow, samples=samples)
+            tasks.append(task)
+    return tasks
+
+
+def carry_out(runner: Runner, pairs: Iterable[StepPair]) -> Found[list[StepPairResult]]:
+    """What was read from pairs; those of which a run broke down are missing."""
+    results = []
+    for each in results_of(runner, [*pairs]):
+        if isinstance(each, Missing):
+            yield each
+        else:
+            results.append(each)
     return results
 
 

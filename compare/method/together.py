@@ -13,7 +13,7 @@ from compare.method.brackets import Bracket, Search, narrow
 from compare.method.record import Measured, Measurement, Missing
 from compare.method.runner import Runner
 from compare.method.settling import SettlingCriteria, SteadyState, settle_groups
-from compare.method.step_pairs import Start
+from compare.method.step_pairs import Start, StepPair, StepPairResult, results_of
 from model import Trajectory
 
 T = TypeVar("T")
@@ -50,6 +50,13 @@ def narrowed(*searches: Search, careful: bool = True) -> Procedure[list[Bracket]
     """The brackets of searches, see `narrow`."""
     brackets: list[Bracket] = yield Wanted(narrow, (careful,), searches)
     return brackets
+
+
+def stepped(*pairs: StepPair) -> Procedure[list[StepPairResult]]:
+    """What was read from pairs of runs; those of which one broke down are missing."""
+    found: list[StepPairResult | Missing] = yield Wanted(results_of, (), pairs)
+    yield from (each for each in found if isinstance(each, Missing))
+    return [each for each in found if not isinstance(each, Missing)]
 
 
 def together(runner: Runner, procedures: Iterable[Procedure[None]]) -> Measured:

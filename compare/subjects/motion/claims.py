@@ -16,7 +16,7 @@ from compare.method.quantities import quantity
 from compare.method.record import Measurement, state
 from compare.method.settling import forces
 from compare.method.statistics import Estimate
-from compare.subjects.motion.measure import LANDED, late_ramp
+from compare.subjects.motion import measure as moving
 from compare.verification.claim import Criterion, Text, claim, criteria, given
 from compare.verification.judge import RTOL, integrated, simulated, theory
 from compare.verification.states import exists
@@ -55,7 +55,7 @@ def _fallen(m: Measurement) -> Estimate:
 
 def _end_of_motion(m: Measurement) -> Estimate:
     """A state variable of theory's motion at the time at which the measured one ends."""
-    flow = late_ramp(m.parameters, m.at["rate"], m.at["time"]) if "rate" in m.at else None
+    flow = moving.late_ramp(m.parameters, m.at["rate"], m.at["time"]) if "rate" in m.at else None
     motion = simulated(m.parameters, state(m), m.at["time"], flow=flow)
     value = float(getattr(motion, m.of)[-1])
     return integrated(value, quantity(m.quantity).size(m.parameters))
@@ -100,7 +100,7 @@ def _rolls_or_motion(m: Measurement) -> float:
     return Case.RR if _is_stable(Case.RR, m) else float(_motion(m).case[-1])
 
 
-_SMOOTH, _ROUGH = given(start="smooth wall"), given(start="rough floor")
+_SMOOTH, _ROUGH = (given(start=start) for start in moving.AT_A_BORDER)
 
 
 def _motion_either(m: Measurement) -> Trajectory:
@@ -161,7 +161,7 @@ LAW_CLAIMS = (
         "extension, (9), (20)",
         "A ball that is thrown flies on under gravity and drag, past the axis of the vessel, and "
         "keeps its spin.",
-        *_end_states("thrown", "thrown up", "thrown, blunter"),
+        *_end_states(*moving.THROWN, moving.BLUNTER),
         Criterion(
             "runs",
             "end_y",
@@ -177,23 +177,14 @@ LAW_CLAIMS = (
         "The wall contact opens where it carries no load, or where friction at the floor pulls the "
         "ball inwards more than its orbit needs. The ball then leaves the wall as the equations "
         "say.",
-        *_end_states("pulled off, at rest", "pulled off, going round"),
+        *_end_states(*moving.PULLED_OFF),
     ),
     claim(
         "sliding",
         "(20), (23)-(29)",
         "A ball that slips or rolls at one contact or both moves on from case to case as the "
         "equations say, also while the flow rises or falls.",
-        *_end_states(
-            "slips at the floor",
-            "slips at the wall",
-            "slips at both",
-            "slips off the wall",
-            "rolls off the wall",
-            "rolls while the flow rises",
-            "rolls while the flow falls",
-            "sinks along the wall",
-        ),
+        *_end_states(*moving.SLIDING, *moving.IN_RAMPS),
     ),
     claim(
         "smooth-wall",
@@ -232,7 +223,7 @@ LAW_CLAIMS = (
         "A ball that lands does not rebound, and friction acts on it during the impact by "
         "Coulomb's law for impulses.",
         Criterion("impacts", "rebounds", lambda m: 0.0, by="Newton's law with restitution 0"),
-        *criteria("impacts", [f"after_{name}" for name in LANDED], _end_of_motion, by=_RUN),
+        *criteria("impacts", [f"after_{name}" for name in moving.LANDED], _end_of_motion, by=_RUN),
         reason="Impacts are not in the paper: Newton's law with restitution 0, and Coulomb's for "
         "the impulses.",
     ),

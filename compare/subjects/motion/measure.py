@@ -42,7 +42,7 @@ from compare.campaign.tasks import Task
 from compare.method.conditions import Conditions, state_of
 from compare.method.conditions import FluidConditions as Fluid
 from compare.method.protocol import Protocol
-from compare.method.record import Found, Measured, Records, Sets
+from compare.method.record import Measured, Records, Sets
 from compare.method.runner import Runner, coarse_step
 from compare.method.scales import time_unit
 from compare.method.settling import PRESSES, forces, settled_readings
@@ -62,6 +62,7 @@ from compare.method.step_pairs import (
     random_state,
     unlike,
 )
+from compare.method.together import Procedure, stepped, together
 from model import Case, Contact, Flow, Parameters, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
@@ -382,34 +383,40 @@ late."""
 
 def motions(runner: Runner, sets: Sets, records: Records) -> Measured:
     """The case at the end of every piece, and how the ball turns there."""
-    count, whole, again = runner.sampling.motions_pieces, list[StepPair](), list[StepPair]()
-    for (name, p), start in product(sets.items(), STARTS):
-        begun = _start(name, p, *start, "a motion")
-        step = coarse_step(begun.p) / STEP_RATIO
-        t_end, rows = round(6.0 * time_unit(begun.p) / step) * step, count * (1 + TURNS)
-        whole.append(StepPair(**vars(begun), t_end=t_end, divisors=(STEP_RATIO,), rows=rows))
     seen: dict[str, set[Case]] = {name: set() for name in sets}
-    for motion in (yield from carry_out(runner, whole)):
-        name, p, run = motion.pair.set, motion.pair.p, motion.fine
+    begun = (_start(*each, *start, "a motion") for each, start in product(sets.items(), STARTS))
+    yield from together(runner, (_cut(runner, start, seen[start.set]) for start in begun))
+    for name, cases in seen.items():
+        if unseen := [case.name for case in Case if case not in cases]:
+            yield runner.missing(name, f"no piece of a motion ended in {', '.join(unseen)}", 0)
+
+
+def _cut(runner: Runner, start: Start, seen: set[Case]) -> Procedure[None]:
+    """The pieces of one motion; the cases in which they end are added to others."""
+    p, count, step = start.p, runner.sampling.motions_pieces, coarse_step(start.p) / STEP_RATIO
+    t_end, rows = round(6.0 * time_unit(p) / step) * step, count * (1 + TURNS)
+    whole = StepPair(**vars(start), t_end=t_end, divisors=(STEP_RATIO,), rows=rows)
+    again = list[StepPair]()
+    for motion in (yield from stepped(whole)):
+        run = motion.fine
         chosen = pieces(run, count)
         if lacking := count - len(chosen):
-            why = "near the ends of pieces the case changes, or a contact hovers, creeps or slips "
-            yield runner.missing(name, f"{why}by a trace", lacking * (1 + TURNS))
+            why = (
+                "at ends of pieces the case changes, or a contact hovers, creeps, slips by a trace"
+            )
+            yield runner.missing(start.set, why, lacking * (1 + TURNS))
         for first in chosen:
             last = first + PIECE
             case = Case(int(run.case[last]))
-            seen[name].add(case)
+            seen.add(case)
             x = constrained(Case(int(run.case[first])), run.x[first], p)
             time = float(run.time[last] - run.time[first])
             at = Conditions(case=case.name, time=time) | state_of(x)
             yield motion.row("case", case, **at)
             divisors = STEP_RATIO // 2, STEP_RATIO, 2 * STEP_RATIO
-            again.append(StepPair(name, p, case.name, x, time, divisors, at=at, rows=TURNS))
-    for piece in (yield from carry_out(runner, again)):
+            again.append(StepPair(start.set, p, case.name, x, time, divisors, at=at, rows=TURNS))
+    for piece in (yield from stepped(*again)):
         yield from _turns_at_end(piece)
-    for name, cases in seen.items():
-        if unseen := [case.name for case in Case if case not in cases]:
-            yield runner.missing(name, f"no piece of a motion ended in {', '.join(unseen)}", 0)
 
 
 def _turns_at_end(piece: StepPairResult) -> Measured:
@@ -520,43 +527,43 @@ def impacts(runner: Runner, sets: Sets, records: Records) -> Measured:
     It does so where its gap, once it has stopped to shrink, grows by more than 1e-2 R: the starts
     are 4 to 5 times that high, and of a plastic landing nothing is left but the fall within a step.
     """
+    return together(runner, (_land(runner, name, p) for name, p in sets.items()))
+
+
+def _land(runner: Runner, name: str, p: Parameters) -> Procedure[None]:
+    """The landings of a set."""
+    p = p.replace(omega_0=0.8 / time_unit(p))
+    unit, step, units = time_unit(p), coarse_step(p) / STEP_RATIO, state_units(p)
     pairs = []
-    for name, p in sets.items():
-        for how, state in LANDINGS.items():
-            start = _start(name, p, 0.8, state, how)
-            step, known = coarse_step(start.p) / STEP_RATIO, state_of(start.x0)
-            pair = StepPair(
-                **vars(start),
-                t_end=round(0.4 * time_unit(p) / step) * step,
-                divisors=(STEP_RATIO, 2 * STEP_RATIO),
-                at=Conditions(start=how) | known,
-                rows=len(LANDED),
-            )
-            pairs.append(pair)
-    rebounds, tasks = dict.fromkeys(sets, 0), {name: list[Task]() for name in sets}
-    landed = list[tuple[StepPairResult, int, float]]()
-    for landing in (yield from carry_out(runner, pairs)):
-        tasks[landing.pair.set] += landing.tasks
-        for run in (landing.coarse, landing.fine):
+    for how, state in LANDINGS.items():
+        start = _start(name, p, 0.8, state, how)
+        at, t_end = Conditions(start=how) | state_of(start.x0), round(0.4 * unit / step) * step
+        divisors = STEP_RATIO, 2 * STEP_RATIO
+        pair = StepPair(**vars(start), t_end=t_end, divisors=divisors, at=at, rows=len(LANDED))
+        pairs.append(pair)
+    rebounds, tasks, landed = 0, list[Task](), list[tuple[StepPairResult, int, float]]()
+    for landing in (yield from stepped(*pairs)):
+        tasks += landing.tasks
+        for run in landing.reads:
             gap = run.y if _meets_floor(landing.pair) else run.h
             low = int(np.argmax(np.append(np.diff(gap) >= 0, True)))
-            rebounds[landing.pair.set] += bool(gap[low:].max() > gap[low] + 1e-2 * landing.pair.p.R)
-        if found := (yield from _after_landing(landing)):
+            rebounds += bool(gap[low:].max() > gap[low] + 1e-2 * p.R)
+        if found := _after_landing(landing):
             landed.append((landing, *found))
-    for landing, at, change in landed:
-        # By chance a contact may close alike with both steps: what others show counts, too.
-        alike = [other for its, _, other in landed if its.pair.set == landing.pair.set]
-        usual = math.sqrt(sum(other**2 for other in alike) / len(alike))
-        p, off = landing.pair.p, uniform(math.hypot(change, usual))
-        units, late = state_units(p), closing_error(runner, p)
-        for name in LANDED:
-            k = VARIABLES.index(name)
-            x, unit = landing.fine.x[2 * at, k], float(units[k])
-            value = estimate(x, unit, time_step=off, closing=late)
-            yield landing.row(f"after_{name}", value, time=float(landing.coarse.time[at]))
-    for name, count in rebounds.items():
-        p = next(pair.p for pair in pairs if pair.set == name)
-        yield runner.measurement(name, p, "rebounds", count, tasks[name])
+        else:
+            why = f"{landing.pair.name}: the contact did not close for good within 0.4 sqrt(R/g)"
+            yield landing.missing(why)
+    # By chance a contact may close alike with both steps: what others show counts, too.
+    usual = math.sqrt(sum(change**2 for *_, change in landed) / max(len(landed), 1))
+    for landing, at_sample, change in landed:
+        off, late = uniform(math.hypot(change, usual)), closing_error(runner, p)
+        time = float(landing.coarse.time[at_sample])
+        for variable in LANDED:
+            k = VARIABLES.index(variable)
+            x, size = landing.fine.x[2 * at_sample, k], float(units[k])
+            value = estimate(x, size, time_step=off, closing=late)
+            yield landing.row(f"after_{variable}", value, time=time)
+    yield runner.measurement(name, p, "rebounds", rebounds, tasks)
 
 
 def _meets_floor(pair: StepPair) -> bool:
@@ -565,26 +572,28 @@ def _meets_floor(pair: StepPair) -> bool:
     return bool(x.y < x.h)
 
 
-def _after_landing(landing: StepPairResult) -> Found[tuple[int, float] | None]:
+def _after_landing(landing: StepPairResult) -> tuple[int, float] | None:
     """The sample six coarse steps after a landing, and the largest change of what it changes, in
-    natural units, with half the step."""
+    natural units, with half the step; None where the contact doesn't stay closed."""
     pair, coarse, fine = landing.pair, landing.coarse, landing.fine
     contact = [case.A if _meets_floor(pair) else case.B for case in coarse.cases]
     at = next((k for k, each in enumerate(contact) if each is not Contact.N), len(contact)) + 6
     if at >= len(contact) or coarse.case[at] != fine.case[2 * at]:
-        yield landing.missing(
-            f"{pair.name}: the contact did not close for good within 0.4 sqrt(R/g)"
-        )
         return None
     changes = np.abs(fine.x[2 * at] - coarse.x[at]) / state_units(pair.p)
     return at, float(changes[[VARIABLES.index(name) for name in LANDED]].max())
 
 
-RUN_STARTS: dict[str, tuple[float, float, tuple[float, ...]]] = {
+THROWN: dict[str, tuple[float, float, tuple[float, ...]]] = {
     "thrown": (0.4, 3.0, (60.0, 1.0, 0.5, 0.6, -0.8, 0.4, 0.6, 0.1)),
     "thrown up": (1.2, 2.0, (60.0, 5.0, -0.6, 0.3, 0.5, -0.9, 0.5, -0.05)),
+}
+"""omega_0, how long, and the state, each in units of R, sqrt(R/g), and for slip sqrt(g R)/r."""
+PULLED_OFF = {
     "pulled off, at rest": (0.3, 0.4, (0.0, 0.0, 0.0, 0.0, 0.0, -1.5, 0.0, 0.0)),
     "pulled off, going round": (0.3, 0.4, (0.0, 0.0, 0.15, 0.2, 0.3, -1.5, 0.0, 0.0)),
+}
+SLIDING = {
     "slips at the floor": (1.2, 0.5, (0.0, 0.0, 1.3, -0.9, 0.0, 0.0, 0.0, 0.0)),
     "slips at the wall": (0.6, 0.5, (0.0, 0.0, 0.4, 0.0, 1.5, 0.0, 0.0, 0.0)),
     "slips at both": (1.5, 0.5, (0.0, 0.0, 1.2, 0.8, 0.6, 1.0, 0.0, 0.0)),
@@ -592,10 +601,10 @@ RUN_STARTS: dict[str, tuple[float, float, tuple[float, ...]]] = {
     "rolls off the wall": (1.5, 1.0, (0.0, 0.0, 0.3, 0.0, 0.2, 0.2, 0.5, -0.2)),
     "sinks along the wall": (1.0, 1.0, (5.0, -0.3, 0.7, 0.5, 0.6, 0.8, 0.0, 0.0)),
 }
-"""omega_0, how long, and the state, each in units of R, sqrt(R/g), and for slip sqrt(g R)/r."""
-
-
-AT_A_BORDER = ("smooth wall", "rough floor")
+BLUNTER = "thrown, blunter"
+IN_RAMPS = {"rolls while the flow rises": 0.2, "rolls while the flow falls": -0.2}
+"""Rates of the flow, in units of g/R."""
+SMOOTH_WALL, ROUGH_FLOOR = AT_A_BORDER = "smooth wall", "rough floor"
 """Starts next to a change of case, of which only case and orbit are measured."""
 
 
@@ -621,7 +630,7 @@ def whole_runs(runner: Runner, sets: Sets, records: Records) -> Measured:
         time = float(fine.time[-1])
         if coarse.case[-1] != fine.case[-1]:
             yield run.missing(f"{how}: with half the time step the ball ends in another case")
-        elif how == "rough floor" and fine.force_A[:, 1].mean() < PRESSES * p.m * p.g:
+        elif how == ROUGH_FLOOR and fine.force_A[:, 1].mean() < PRESSES * p.m * p.g:
             yield run.missing(f"{how}: the contact force is so small that the ball may hover")
         else:
             if at_border := how in AT_A_BORDER:
@@ -647,21 +656,21 @@ def _pairs(name: str, p: Parameters) -> Iterator[StepPair]:
         rows = 2 if how in AT_A_BORDER else len(VARIABLES)
         return StepPair(name, p, how, x0, t_end, (4, 8, 16), count, flow=flow, at=at, rows=rows)
 
-    for how, (flow, lasts, x) in RUN_STARTS.items():
+    for how, (flow, lasts, x) in (THROWN | PULLED_OFF | SLIDING).items():
         start, q = State(*(np.array(x) * state_units(p))), p.replace(omega_0=flow / unit)
         yield pair(how, q, start, lasts)
         if how == "thrown" and p.drag == QUADRATIC:
-            yield pair("thrown, blunter", q.replace(C_D=1.1), start, lasts)  # as blunt as a disk
-    for how, rate in ("rolls while the flow rises", 0.2), ("rolls while the flow falls", -0.2):
+            yield pair(BLUNTER, q.replace(C_D=1.1), start, lasts)  # as blunt as a disk
+    for how, rate in IN_RAMPS.items():
         q = p.replace(omega_0=0.5 / unit)
         yield pair(how, q, State(omega_c=q.omega_0), 2.0, rate / unit**2)
     for flow in (0.5, 0.7, 0.9, 1.1, 1.3):
         going = State(omega_c=flow / unit, slip_y=math.sqrt(p.g * p.R) / p.r)
-        yield pair("smooth wall", p.replace(omega_0=flow / unit, eta=0.0), going, 1.0)
+        yield pair(SMOOTH_WALL, p.replace(omega_0=flow / unit, eta=0.0), going, 1.0)
     for flow in (1.5, 1.7, 1.8, 2.0, 2.2):
         spin = flow / unit * p.R / p.r
         slight = State(omega_c=flow / unit, slip_x=-5e-4 * spin, slip_z=5e-3 * spin)
-        yield pair("rough floor", p.replace(omega_0=flow / unit, mu=1.7), slight, 1.0)
+        yield pair(ROUGH_FLOOR, p.replace(omega_0=flow / unit, mu=1.7), slight, 1.0)
 
 
 PROTOCOLS = (
