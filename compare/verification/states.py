@@ -73,6 +73,15 @@ def lifts_first(m: Measurement) -> bool:
     return m.parameters.eta > m.parameters.j
 
 
+SMOOTH_END = "floor force of settled slipping → 0"
+"""How omega_02 is measured where slipping ends without a fold."""
+
+
+def changes_case(m: Measurement) -> bool:
+    """Whether a threshold is one at which a ball changes its case."""
+    return m.at["by"] != SMOOTH_END
+
+
 def from_floor(m: Measurement) -> bool:
     """Whether the ball started on the floor."""
     return m.at["start"] in ("rest", "with the fluid")

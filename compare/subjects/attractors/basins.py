@@ -33,8 +33,7 @@ from model.parameters import check_names
 ATTRACTORS = ("hops", "RR", "SS", "off the floor", "undecided")
 """Where a ball may end. SR and NR are one: in SR the floor carries nothing (Prop. 3)."""
 UNDECIDED = ATTRACTORS.index("undecided")
-INSTANTS = 500
-"""Of a run, after the first."""
+INSTANTS = 500  # of a run, after the first
 
 
 @dataclass(frozen=True, eq=False)

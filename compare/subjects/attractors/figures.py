@@ -33,8 +33,7 @@ from model import Case, Contact, Parameters, State
 SET = Parameters.named("hopping")
 LOWEST_FLOW, HIGHEST_FLOW = 0.9, 1.4
 """Flows shown, in units of omega_02, farther if the set's own is."""
-STARTS = 20
-"""Random starts from which hops of one's own set are looked for."""
+STARTS = 20  # random starts from which hops of one's own set are looked for
 
 
 @functools.cache

@@ -31,8 +31,7 @@ from model import Case, Contact, Trajectory
 from model.drag import QUADRATIC, STOKES
 
 _SIMULATED, _UNLOADS = "analytic.simulate", "analytic.unloading_limit"
-RTOL = 1e-9
-"""Relative tolerance of simulations: the speed of a landing is measured to 1e-6."""
+RTOL = 1e-9  # relative tolerance of simulations: the speed of a landing is measured to 1e-6
 
 
 def _slope(
@@ -149,8 +148,7 @@ def _at_event(m: Measurement) -> Estimate:
     return integrated(value, value, RTOL)
 
 
-OFF = 0.05
-"""By how much, relatively, the friction of a meter may be off whose limits are claimed."""
+OFF = 0.05  # by how much, relatively, the friction of a meter may be off whose limits are claimed
 
 
 def _nominal_friction(m: Measurement, off: float) -> dict[str, float]:

@@ -330,5 +330,4 @@ def draw_friction(made: Design) -> tuple[Figure, str]:
     )
 
 
-OF_A_METER = draw_readings, draw_friction
-"""The figures of a design's page."""
+OF_A_METER = draw_readings, draw_friction  # the figures of a design's page

@@ -40,8 +40,6 @@ ACROSS_ONSET = (-1e-3, -5e-4, 5e-4, 1e-3, 2e-3, 4e-3, 8e-3)
 """Flows at which states settle for a slope, as relative distances from where slipping sets in."""
 NEIGHBOURS = (-1e-3, -5e-4, 5e-4, 1e-3)
 """The same from a settled state; the nearer ones show the effect of curvature."""
-
-
 SHARP = {"neighbours": 0.3, "jump": 0.1, "mean": 1.0}
 """How slopes are found, and a factor on the drift limit of the states: for the jump they lie close
 together."""
@@ -228,16 +226,11 @@ def _levels(name: str, records: Records, parts: int) -> list[float]:
 
 
 LANDING, UNLOADED = "unloading until it lands", "unloading"
-UPWARDS, BY_SPIN = "push upwards", "push by spin"
-"""Names of pairs."""
-Shown = dict[tuple[str, str], Estimate]
-"""What a run shows, by quantity and event."""
-UNLOADED_FROM = 1.02
-"""Flow before the unloading, in units of the measured omega_02."""
-UNLOADED_TO = 0.95
-"""The flow after it, in the same unit."""
-WALL_PUSH = 1e-2
-"""Speed of a push in units of sqrt(g R), or more spin in units of that on the wall."""
+UPWARDS, BY_SPIN = "push upwards", "push by spin"  # names of pairs
+Shown = dict[tuple[str, str], Estimate]  # what a run shows, by quantity and event
+UNLOADED_FROM = 1.02  # flow before the unloading, in units of the measured omega_02
+UNLOADED_TO = 0.95  # the flow after it, in the same unit
+WALL_PUSH = 1e-2  # speed of a push in units of sqrt(g R), or more spin in units of that on the wall
 
 
 def unloading(runner: Runner, sets: Sets, records: Records) -> Measured:

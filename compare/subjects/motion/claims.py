@@ -29,8 +29,6 @@ _OWN = (
     "The paper has no equations away from the wall: (20), with a drag on radial motion, is this "
     "project's extension."
 )
-
-
 _RUN = "analytic.simulate"
 _TORQUE = "analytic.flowmeter.real_fluid.rolling"
 _HOLDS = "analytic.slip_stability.stability"
@@ -228,7 +226,6 @@ LAW_CLAIMS = (
         "the impulses.",
     ),
 )
-
 _SOURCES = {
     Case.RR: "(23)",
     Case.RS: "(24)",

@@ -69,8 +69,7 @@ from model.cases import TRAITS
 from model.drag import QUADRATIC, STOKES
 from model.kinematics import SLIP_XYZ, TURNING, VARIABLES, slip_velocities, state_units
 
-RUN_LENGTH = 768
-"""Length of a run in coarse steps, which is about 40 sqrt(R/g), and its samples."""
+RUN_LENGTH = 768  # length of a run in coarse steps, which is about 40 sqrt(R/g), and its samples
 ROUNDING = 100 * float(np.finfo(float).eps)
 FLUIDS: Mapping[str, Fluid] = {
     "steel-in-water": Fluid(nu_f=1.004e-6, rho_f=998.2, rho_b=7850.0, r=5e-3, gravity=9.81),
@@ -209,20 +208,16 @@ def _sinking_speed(slow: Trajectory, fast: Trajectory) -> tuple[float, float]:
     return float(slow.v_y[0] + (slow.v_y[-1] - slow.v_y[0]) / lost), float(fast.time[-1])
 
 
-STATES_SEED = 53
-"""Of the random states of the field of motion."""
+STATES_SEED = 53  # of the random states of the field of motion
 WINDOW_CENTRES = (16, 40, 64)
 """Of the windows in which equations of motion are looked at; in steps of the coarser run."""
-AROUND_WINDOW = 4
-"""Steps in which the case doesn't change, either: friction has built up."""
+AROUND_WINDOW = 4  # steps in which the case doesn't change, either: friction has built up
 FIELD_DEGREES = 7, 5
 """Of the polynomials through a window; the lower one shows what the degree changes. (They were 5
 and 3: without the errors of the step, degree 5 was off by more than it differs from 3.)"""
 MOST_TURN = 0.5
 """Largest change of a slip, and of that which friction alone would make, divided by the slip: where
 slip is about to vanish, or very small, friction turns too fast."""
-
-
 MOVING = {
     case: [k for k, name in enumerate(VARIABLES) if name in {*TRAITS[case].active} - {"y", "h"}]
     for case in Case
@@ -369,12 +364,8 @@ STARTS: tuple[tuple[float, tuple[float, ...]], ...] = (
     (1.20, (0.0, 0.0, 0.40, 0.6, 0.1, -0.5, 0.5, 0.0)),
 )
 """omega_0 and the state, each in units of R, sqrt(R/g), and for slip sqrt(g R)/r."""
-
-
-PIECE = 40
-"""Of a motion, in samples."""
-TURNS = len(VARIABLES[TURNING])
-"""Measurements at the end of a piece, beside the case."""
+PIECE = 40  # of a motion, in samples
+TURNS = len(VARIABLES[TURNING])  # measurements at the end of a piece, beside the case
 APART = 10
 """Samples between the ends of a piece and any change of case: three until a force has built up,
 three until the case is taken to have changed, and a few by which a change comes too early or
@@ -518,8 +509,7 @@ LANDINGS: dict[str, tuple[float, ...]] = {
     "wall, at a slant": (0.6, -0.5, 0.9, -0.4, -0.2, 0.1, 0.05, -0.3),
 }
 """States in the units of `STARTS`."""
-LANDED = ("v_y", "omega_c", "slip_x", "slip_y", "slip_z", "v_h")
-"""Variables that a landing changes."""
+LANDED = ("v_y", "omega_c", "slip_x", "slip_y", "slip_z", "v_h")  # variables that a landing changes
 
 
 def impacts(runner: Runner, sets: Sets, records: Records) -> Measured:

@@ -58,8 +58,7 @@ from model.arrays import Array
 from model.drag import QUADRATIC
 from model.kinematics import SLIP_XYZ
 
-FIGURES = ("fig-7", "fig-8")
-"""mu as it is, and mu = eta."""
+FIGURES = ("fig-7", "fig-8")  # mu as it is, and mu = eta
 WAYS = ("rest", "half as fast", "with the fluid", "on the wall")
 """How balls start at each point of a plane."""
 
@@ -140,10 +139,8 @@ def added_points(seen: Sequence[tuple[Array, int]]) -> list[Array]:
     return [(places[a] + places[b]) / 2 for _, a, b in turns]
 
 
-FAR_FROM_EDGE = 0.1
-"""A long way, in two fifths of a run, divided by the distance of the attractors."""
-ARRIVED = 0.01
-"""Distance at which a ball has arrived, divided likewise."""
+FAR_FROM_EDGE = 0.1  # a long way, in two fifths of a run, divided by the distance of the attractors
+ARRIVED = 0.01  # distance at which a ball has arrived, divided likewise
 WIDTHS = 2 * math.sqrt(3)
 """Most by which the places in two brackets of a width differ, in standard uncertainties of one."""
 CLOSING = (0.1, 0.17, 0.26, 0.38)
@@ -358,8 +355,7 @@ def ends_slipping(run: Trajectory, edge: Edge) -> bool | None:
     return rests[0] if any(rests) else None
 
 
-FIRST_DRAGS = (2.0, 4.0)
-"""Drag at which the range of slipping is measured first, c sqrt(R/g)."""
+FIRST_DRAGS = (2.0, 4.0)  # drag at which the range of slipping is measured first, c sqrt(R/g)
 NEARER_DRAGS = (1.6, 2.6)
 """Drag measured then, in units of that extrapolated from those: states settle soon."""
 BEFORE_FOLD = (0.02, 0.035, 0.055, 0.08, 0.12)

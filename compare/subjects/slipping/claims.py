@@ -136,8 +136,7 @@ def _case_on_wall(m: Measurement) -> float:
     return float(Case.NR if holds is SlipStability.STABLE else Case.NS)
 
 
-_gammas = partial(Criterion, "growth", "gamma")
-"""A criterion on how fast slips grow."""
+_gammas = partial(Criterion, "growth", "gamma")  # a criterion on how fast slips grow
 
 
 def _growth(arrow: tuple[Case, Case]) -> Iterator[Criterion]:

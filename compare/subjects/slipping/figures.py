@@ -15,10 +15,8 @@ from compare.figures.branches import check_thresholds
 from compare.figures.drawing import Diagram, diagram
 from model import Case
 
-BETA = 0.9
-"""Direction (54) of the push, rad: across that of decay, so that the path bends."""
-PUSHED = 1.0
-"""Size of the push, rad s-1."""
+BETA = 0.9  # direction (54) of the push, rad: across that of decay, so that the path bends
+PUSHED = 1.0  # size of the push, rad s-1
 MOTIONS = {"fig-4": (1.38, 3.4), "fig-5": (0.88, 0.17)}
 """Flows in units of omega_02, and times in units of sqrt(R/g): in Fig. 4 slip ends."""
 

@@ -76,8 +76,7 @@ SLIPS = {Case.RS: (1,), Case.SR: (0,), Case.SS: (0, 1, 2), Case.NS: (1, 2)}
 # steps of a record of slip; at its start, where contact forces build up; and at its end, in which
 # the case must be the same for a slip to have passed into it
 RECORD_STEPS, RECORD_SKIPPED, RECORD_SETTLED = 20, 6, 6
-RECORD_DEGREES = (4, 3)
-"""Of the polynomials; the lower one shows what the degree changes."""
+RECORD_DEGREES = (4, 3)  # of the polynomials; the lower one shows what the degree changes
 # Slips at the start, in units of `start_unit`, each half of the one before:
 LARGE_SLIPS = (3.0, 1.5)  # so large that they neither end nor turn much in a record
 SMALL_SLIPS = (0.3, 0.15)  # where one contact has to hold
@@ -347,8 +346,7 @@ def _turn(fan: Sequence[Push]) -> Procedure[None]:
 AROUND, AROUND_BENT = (0.7, 1.3), (0.8, 1.1)  # the latter where the law of drag bends the line
 MOST_BEYOND = 2.1
 """Largest zero recorded, divided by the largest value at which slip stayed in its case."""
-MOST_FOLLOWED = 100.0
-"""Largest zero followed, divided by the largest of the first flows."""
+MOST_FOLLOWED = 100.0  # largest zero followed, divided by the largest of the first flows
 HANGING = (1.05, 1.6, 1.3)
 """Flows at which balls hang on a smooth wall, in units of the least that holds them."""
 
@@ -499,10 +497,7 @@ ARROWS: dict[tuple[Case, Case], tuple[float, float, float]] = {
     (Case.SS, Case.NS): (0.3, 0.1, 0.8),
 }
 """Slips at first in units of sqrt(g R)/r; of a rolling wall contact in R/r omega_c."""
-
-
-LEAD = 1.5
-"""How much faster than the ball the fluid goes round where a contact slips."""
+LEAD = 1.5  # how much faster than the ball the fluid goes round where a contact slips
 FIRST_ORBITS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5)
 """Orbits at which the force on the floor is measured first, omega_c sqrt(R/g)."""
 LATER_ORBITS = (0.05, 0.08, 0.12, 0.17)
@@ -510,8 +505,7 @@ LATER_ORBITS = (0.05, 0.08, 0.12, 0.17)
 # steps of a run in which the force on the floor is measured; at its start, where contact forces
 # build up; and the fewest samples on the floor that must be left
 LIFT_STEPS, LIFT_SKIPPED, FEWEST_PRESSED = 16, 4, 5
-LIFT_DEGREES = (3, 2)
-"""Of the polynomials; the lower one shows what the degree changes."""
+LIFT_DEGREES = (3, 2)  # of the polynomials; the lower one shows what the degree changes
 
 
 def lift(runner: Runner, sets: Sets, records: Records) -> Measured:

@@ -61,15 +61,13 @@ PUSH = {Case.RS: 0.3, Case.SR: 0.1}
 USUAL_PUSH = 2e-4
 """Size of a push that isn't extrapolated to zero, under Stokes' law of drag. The run with the
 coarser step has half of it, and shows that it doesn't matter."""
-SLIGHT_PUSH = 2e-6
-"""The same under other laws: in proportion to a lag only far below Re = 1."""
+SLIGHT_PUSH = 2e-6  # the same under other laws: in proportion to a lag only far below Re = 1
 SOLVED_MOVING = 2e-11
 """Relative accuracy to which contact forces are solved in a step after a push; those of a settled
 state are solved better, see `settling.SOLVED`. (Chosen after states that swing had been seen.)"""
 SLOWEST_SLIP = 0.04
 """Least slip speed of a state divided by sqrt(g R): a push is to be small beside it."""
-ZERO_RATE = 0.05
-"""Measured rates below this share of the drag coefficient c count as zero."""
+ZERO_RATE = 0.05  # measured rates below this share of the drag coefficient c count as zero
 STATES = {Case.RR: 1, Case.SR: 2, Case.SS: 2, Case.NR: 1, Case.NS: 1}
 """Most states of a case and set at the quick level, spread over the flows; more at the others."""
 NOT_LINEAR = (
@@ -287,8 +285,7 @@ class Spectrum(NamedTuple):
 
     exponents: Exponents
     uncertainty: Array
-    budget: Mapping[str, Array]
-    """Standard uncertainties by cause."""
+    budget: Mapping[str, Array]  # standard uncertainties by cause
 
 
 def spectrum(state: Pushed, answers: Sequence[Array], step: float) -> Spectrum:

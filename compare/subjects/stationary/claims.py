@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from functools import partial
 
 import analytic
 from analytic.bifurcation import diagram as bifurcation
@@ -16,6 +17,7 @@ from compare.verification.claim import Criterion, Text, When, all_of, claim, cri
 from compare.verification.judge import theory
 from compare.verification.states import (
     case_of,
+    changes_case,
     exists,
     from_floor,
     is_in,
@@ -28,6 +30,7 @@ from compare.verification.states import (
 )
 from model import Case, State
 from model.drag import SCHILLER_NAUMANN
+from model.kinematics import VARIABLES
 
 MOTION = ("omega_c", "slip_x", "slip_y", "slip_z", "v_y")
 
@@ -81,7 +84,7 @@ def _value_criteria(
 
 def _case_criterion(when: When) -> Criterion:
     """A criterion on the case to which a ball settles."""
-    return Criterion("settled", "case", case, when=when, by="analytic.stable_solutions")
+    return Criterion("settled", "case", case, when=when, by=_STABLE)
 
 
 def _rolling_criterion(when: When = lambda m: True) -> Criterion:
@@ -97,12 +100,14 @@ def _sinks_at_reynolds(m: Measurement) -> float:
     return float(-(p.g - p.eta * p.R * p.omega_0**2) / (p.c * more))
 
 
-def _along_branch(m: Measurement) -> float:
-    """A contact force of SS in closed form at the flow, before the fold, N."""
-    p = m.parameters
-    branch = slipping_branch.branch(slipping_branch.points_at(p)[0], p)
-    loads = {"force_Ay": branch.A_y, "force_Bx": branch.B_x, "force_Az": -branch.drag}
-    return float(loads[m.quantity]) * p.m * p.g
+def _on_branch(m: Measurement) -> float:
+    """A slip or contact force of SS in closed form at the flow, before the fold, SI."""
+    p, point = m.parameters, slipping_branch.points_at(m.parameters)[0]
+    if m.of in VARIABLES:
+        return float(getattr(State.of(slipping_branch.states(point, p)[0]), m.of))
+    branch = slipping_branch.branch(point, p)
+    loads = {"Ay": branch.A_y, "Bx": branch.B_x, "Az": -branch.drag}
+    return float(loads[m.of]) * p.m * p.g
 
 
 def _region(m: Measurement) -> Exists:
@@ -124,8 +129,12 @@ _LASTING = {
 def _cases_in_region(m: Measurement) -> float:
     """The bit mask of the cases in which a ball can settle, by the labels of the region."""
     region = _region(m)
-    lasting = set[Case]().union(*(those for flag, those in _LASTING.items() if flag in region))
-    return float(sum(1 << case for case in lasting))
+    return _mask(set[Case]().union(*(_LASTING[flag] for flag in _LASTING if flag in region)))
+
+
+def _mask(cases: Iterable[Case]) -> float:
+    """Cases as one number, a bit each."""
+    return float(sum(1 << case for case in cases))
 
 
 def _omega_c_beyond_fold(m: Measurement) -> float:
@@ -150,12 +159,6 @@ def _on_surface(m: Measurement) -> float:
     return float(surfaces[m.quantity]) * math.sqrt(p.g / p.R)
 
 
-def _slip_on_branch(m: Measurement) -> float:
-    """A component of slip of SS in closed form at the flow, before the fold, rad s-1."""
-    x, _ = slipping_branch.states(slipping_branch.points_at(m.parameters)[0], m.parameters)
-    return float(getattr(State.of(x), m.quantity))
-
-
 def _drag_at_birth(m: Measurement, equal: bool = False) -> float:
     """The drag c, s-1, at which the fold is born at eta, which is proportional to c^2.
 
@@ -173,6 +176,11 @@ def _where_all_meet(m: Measurement) -> float:
     return bifurcation.double_points(m.parameters)[-1].omega_0
 
 
+def _equal_friction(m: Measurement) -> bool:
+    """Whether floor and wall are equally rough, as in Fig. 8."""
+    return m.parameters.mu == m.parameters.eta
+
+
 def _slip_along_alpha(m: Measurement) -> float:
     """A component of slip of SS by the speed and the direction alpha of its solution, rad s-1."""
     solution = solution_of(m)
@@ -183,15 +191,10 @@ def _slip_along_alpha(m: Measurement) -> float:
 _ROLLS, _SLIPS, _LIFTED, _SINKS = (is_in(each) for each in (Case.RR, Case.SS, Case.NR, Case.NS))
 _LEANS = all_of(_LIFTED, from_floor)
 _STATE = (*MOTION, *FORCES)
-
-
-def _crossed(m: Measurement) -> bool:
-    """Whether a threshold is that at which the ball settles in another case."""
-    return m.at["by"] != "floor force of settled slipping → 0"
-
-
+_slipping = partial(criteria, "settled", when=_SLIPS)
+"""Criteria on balls that have settled slipping at both points."""
 _DOUBLE = "analytic.bifurcation.diagram.double_points"
-
+_STABLE = "analytic.stable_solutions"
 CLAIMS = (
     claim(
         "prop-1",
@@ -249,33 +252,15 @@ CLAIMS = (
             Criterion("settled", slip, lambda m: 0.0, when=_SLIPS, relation=relation, by="(40)")
             for slip, relation in (("slip_z", Relation.AT_LEAST), ("slip_x", Relation.AT_MOST))
         ),
-        *criteria(
-            "settled",
-            ("slip_z", "slip_x"),
-            _slip_on_branch,
-            when=_SLIPS,
-            by="slipping_branch.states",
-        ),
-        *criteria(
-            "settled",
-            ("slip_z", "slip_x"),
-            _slip_along_alpha,
-            when=_SLIPS,
-            by="analytic.stable_solutions: alpha",
-        ),
+        *_slipping(("slip_z", "slip_x"), _on_branch, by="slipping_branch.states"),
+        *_slipping(("slip_z", "slip_x"), _slip_along_alpha, by="analytic.stable_solutions: alpha"),
     ),
     claim(
         "eq-42",
         "(42), (43)",
         "Slipping at both points, the normal forces at floor and wall are the closed forms in α, "
         "and friction holds the ball back along its orbit.",
-        *criteria(
-            "settled",
-            ("force_Ay", "force_Bx", "force_Az"),
-            _along_branch,
-            when=_SLIPS,
-            by="slipping_branch.branch",
-        ),
+        *_slipping(("force_Ay", "force_Bx", "force_Az"), _on_branch, by="slipping_branch.branch"),
     ),
     claim(
         "prop-6",
@@ -302,10 +287,9 @@ CLAIMS = (
             _STATE, is_in(Case.SS, Case.NR), "(37)-(47), mirrored", protocol="mirrored"
         ),
         *_value_criteria((*MOTION, *SUMS), _ROLLS, "(31), (32), mirrored", protocol="mirrored"),
-        Criterion("mirrored", "case", case, by="analytic.stable_solutions"),
+        Criterion("mirrored", "case", case, by=_STABLE),
     ),
 )
-
 DIAGRAMS = (
     claim(
         "fig-9",
@@ -339,21 +323,21 @@ DIAGRAMS = (
             Criterion(
                 "plane",
                 "cases",
-                lambda m: sum(1 << case for case in lasting_cases(m.parameters)),
+                lambda m: _mask(lasting_cases(m.parameters)),
                 when=given(figure=figure),
-                by="analytic.stable_solutions",
+                by=_STABLE,
             ),
             *criteria(
                 "thresholds",
                 [f"omega_0{k}" for k in (1, 2, 3, 4)],
                 _on_surface,
-                when=all_of(_crossed, on_plane),
+                when=all_of(changes_case, on_plane),
                 by="analytic.bifurcation.diagram.threshold_curves",
             ),
         )
         for figure, axis, on_plane in (
             ("fig-7", "η", lambda m: True),
-            ("fig-8", "μ = η", lambda m: m.parameters.mu == m.parameters.eta),
+            ("fig-8", "μ = η", _equal_friction),
         )
     ),
     claim(
@@ -375,8 +359,8 @@ DIAGRAMS = (
         Criterion(
             "birth",
             "critical_drag",
-            lambda m: _drag_at_birth(m, equal=True),
-            when=lambda m: m.parameters.mu == m.parameters.eta,
+            partial(_drag_at_birth, equal=True),
+            when=_equal_friction,
             by=f"{_DOUBLE}, equal friction",
         ),
         Criterion("thresholds", "omega_03", _where_all_meet, by=_DOUBLE),

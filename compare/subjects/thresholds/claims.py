@@ -39,8 +39,7 @@ def _threshold(quantity: str, when: When = _changes, protocol: str = "thresholds
     return Criterion(protocol, quantity, predict, when=when, by=f"{_BY}: {quantity}")
 
 
-_measured = partial(Criterion, "thresholds")
-"""A criterion on what this protocol measures."""
+_measured = partial(Criterion, "thresholds")  # a criterion on what this protocol measures
 
 
 def _unstable_quantity(m: Measurement) -> float:

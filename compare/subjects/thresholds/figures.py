@@ -34,10 +34,8 @@ from compare.method.record import Measurement
 from model import Case, Parameters, State
 from model.arrays import Array
 
-_THEORY = Parameters.named("reference")
-"""Shown where nothing was measured."""
-_WIDEST = 0.8
-"""Friction of the wall up to which planes are shown."""
+_THEORY = Parameters.named("reference")  # shown where nothing was measured
+_WIDEST = 0.8  # friction of the wall up to which planes are shown
 _SECTIONS = {0.2: "Figs. 9, 10", 0.6: "Figs. 9, 11"}
 """The two typical sections of Fig. 7, by wall friction."""
 _BISTABLE = Exists.SS | Exists.SS_BEYOND_FOLD | Exists.SR | Exists.NR

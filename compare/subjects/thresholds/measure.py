@@ -56,8 +56,7 @@ LAGS = 1e-3
 CREEPS = 100.0
 """Slip, in that unit, at which a ball may creep to rest jammed between floor and wall."""
 COARSE = 1e-2  # relative width of a bracket where only the neighbourhood is wanted
-AWAY = 0.03
-"""Relative distance from a known end of rolling, where an engine beside looks for it."""
+AWAY = 0.03  # relative distance from a known end of rolling, where an engine beside looks for it
 # Relative distances of settled states from where something vanishes; from where a ball rides the
 # wall as slowly as it can; and below a fold, in parts of the range of slipping: slip goes like the
 # root.
@@ -146,14 +145,10 @@ class Passage:
     """A flow up to which, or from which on, a ball moves in some case."""
 
     name: str
-    time: float
-    """How long a run takes in which that is asked, in units of 1/c."""
-    answer: Answer
-    """Yes below the flow, no above."""
-    start: str = ""
-    """How balls start of which is asked when that ends."""
-    thresholds: tuple[str, ...] = ()
-    """Those that it may be."""
+    time: float  # how long a run takes in which that is asked, in units of 1/c
+    answer: Answer  # yes below the flow, no above
+    start: str = ""  # how balls start of which is asked when that ends
+    thresholds: tuple[str, ...] = ()  # those that it may be
 
 
 # The ball still rolls; the wall doesn't hold it; it settles on the floor, or may.
@@ -171,8 +166,7 @@ ENDS = RR_ENDS, NS_ENDS, SS_ENDS
 NR_BEGINS = Passage("NR begins", 5, lambda run: slip(sliding_speeds(run)[1], run) > 1)
 RR_RETURNS = Passage("RR returns", 20, lambda run: presses(run) and settled_case(run) is Case.RR)
 FOLD = Passage("fold", 1.4, settles)
-From = Callable[[Parameters], Array]
-"""The state in which a ball starts, by its parameters."""
+From = Callable[[Parameters], Array]  # the state in which a ball starts, by its parameters
 
 
 def measure(runner: Runner, sets: Sets, records: Records) -> Measured:

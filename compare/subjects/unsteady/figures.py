@@ -25,8 +25,7 @@ from model.arrays import Array
 
 _LASTS = 4.0, 56.0
 """Times shown after a jump: in units of 1/c, and of sqrt(R/g), whichever is shorter."""
-FREQUENCIES = 22
-"""Frequencies for which theory computes the onset of slip and the mean error."""
+FREQUENCIES = 22  # frequencies for which theory computes the onset of slip and the mean error
 SHARES = 0.2, 0.4, RAMP[0]
 """Flows of the jumps shown of a ball that slips, as parts of the way to where that ends."""
 

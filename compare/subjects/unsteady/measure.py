@@ -58,10 +58,8 @@ far from linear."""
 RAISED = 1.5  # factor by which the amplitude is raised at a time under other laws than Stokes'
 PERIODS = 3  # of a pulsation in a run
 ROUNDS = 5  # successive runs of a driven ball until it is settled, the last with half the step
-LASTING = 5
-"""Samples for which slip must last to count: friction may be full for a moment before."""
-PHASES = 8
-"""Phases of a period at which the motion is started anew from its state."""
+LASTING = 5  # samples for which slip must last to count: friction may be full for a moment before
+PHASES = 8  # phases of a period at which the motion is started anew from its state
 STRONG = ((0.25, 4.0), (0.4, 4.0), (0.6, 5.5), (0.75, 4.0))
 """Flows, in units of that at which rolling ends, about which the ball is driven by an amplitude in
 units of the flow: it slips at the wall alone about the slow ones, at both points about the
