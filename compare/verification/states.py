@@ -10,6 +10,7 @@ from compare.method.settling import forces, physical_case
 from compare.verification.claim import When
 from compare.verification.judge import theory
 from model import Case, Parameters
+from model.drag import STOKES
 from model.kinematics import VARIABLES
 
 
@@ -80,6 +81,11 @@ SMOOTH_END = "floor force of settled slipping → 0"
 def changes_case(m: Measurement) -> bool:
     """Whether a threshold is one at which a ball changes its case."""
     return m.at["by"] != SMOOTH_END
+
+
+def by_stokes(m: Measurement) -> bool:
+    """Whether drag is by Stokes' law."""
+    return m.parameters.drag == STOKES
 
 
 def from_floor(m: Measurement) -> bool:

@@ -15,9 +15,10 @@ from compare.method.record import Measurement, state
 from compare.method.settling import physical_case
 from compare.method.statistics import Estimate
 from compare.subjects.flowmeter.measure import BY_SPIN, UNLOADED, UPWARDS, first_top
-from compare.verification.claim import Criterion, Text, When, all_of, claim, criteria, given
+from compare.verification.claim import Criterion, Text, When, all_of, claim, given
 from compare.verification.judge import integrated, simulated, theory
 from compare.verification.states import (
+    by_stokes,
     case_of,
     from_floor,
     is_in,
@@ -28,18 +29,16 @@ from compare.verification.states import (
     solutions,
 )
 from model import Case, Contact, Trajectory
-from model.drag import QUADRATIC, STOKES
+from model.drag import QUADRATIC
 
 _SIMULATED, _UNLOADS = "analytic.simulate", "analytic.unloading_limit"
 RTOL = 1e-9  # relative tolerance of simulations: the speed of a landing is measured to 1e-6
 
 
-def _slope(
-    by: str, predict: Callable[[Measurement], float], function: str, *cases: Case
-) -> Criterion:
+def _slope(by: str, predict: Callable[[Measurement], float], of: str, *cases: Case) -> Criterion:
     """A criterion on slopes of the curve measured in one way, in some cases."""
     when = all_of(given(by=by), is_in(*cases))
-    return Criterion("slope", "slope", predict, when=when, by=f"analytic.{function}")
+    return Criterion("slope", "slope", predict, when=when, by=f"analytic.{of}")
 
 
 def _slope_at(m: Measurement) -> float:
@@ -62,11 +61,6 @@ def _only_rolling(m: Measurement) -> float:
 def _range(m: Measurement) -> float:
     """The flow up to which the meter can be used, rad s-1."""
     return analytic.operating_range(m.parameters)
-
-
-def _ends_unloading(m: Measurement) -> bool:
-    """Whether unloading ends the range of a meter, of which the floor then lets go."""
-    return analytic.operating_limit(m.parameters).end is End.UNLOADING
 
 
 def _unloads(m: Measurement) -> float:
@@ -165,20 +159,10 @@ def _one_end(m: Measurement) -> bool:
     return not p.eta / spread < p.j < p.eta * spread
 
 
-def _stokes(m: Measurement) -> bool:
-    """Whether a set has Stokes' drag."""
-    return m.parameters.drag == STOKES
-
-
-def _exact(m: Measurement) -> float:
-    """The flow up to which a design covers a ball without tolerances."""
-    return design.choice(m.parameters.replace, {}, {}, fastest=1.0).margin
-
-
-def _worst(m: Measurement) -> float:
-    """The flow up to which a design covers a meter of nominal friction, at worst."""
-    nominal = _nominal_friction(m, OFF)
-    tolerances = dict.fromkeys(nominal, OFF)
+def _covered(m: Measurement, off: float) -> float:
+    """The flow up to which a design covers a meter at worst, whose friction may be off."""
+    nominal = _nominal_friction(m, off) if off else {}
+    tolerances = dict.fromkeys(nominal, off)
     return design.choice(m.parameters.replace, nominal, tolerances, fastest=1.0).margin
 
 
@@ -196,7 +180,7 @@ def _by_sensitivity(m: Measurement) -> float:
     return analytic.thresholds(p.replace(**half)).omega_02 * 2**power
 
 
-def _loop_reading_of_design(m: Measurement) -> float:
+def _reading_of_design(m: Measurement) -> float:
     """The reading of a rising or falling flow, from the design's characteristic curve."""
     low, high = design.readings(m.parameters, m.parameters.omega_0)
     return float(low if m.at["side"] == "up" else high)
@@ -205,8 +189,12 @@ def _loop_reading_of_design(m: Measurement) -> float:
 _ENDS_OF_RANGES = (("omega_01", slips_first), ("omega_02", lifts_first))
 _DESIGN, _STABLE = "analytic.flowmeter.design", "analytic.stable_solutions"
 _WITHIN_TOLERANCES: tuple[Callable[[Measurement], float], ...] = (
-    _worst,
+    partial(_covered, off=OFF),
     *(partial(_end_of_spread, end=k) for k in (0, 1)),
+)
+_settled, _thresholds, _unloading, _loop = (
+    partial(Criterion, protocol)
+    for protocol in ("settled", "thresholds", "unloading", "hysteresis")
 )
 CLAIMS = (
     claim(
@@ -244,15 +232,14 @@ CLAIMS = (
         "from rest the ball slips (η < j), and on the wall it stays (η > j).",
         # Slipping on the floor no ball sinks.
         *(
-            Criterion("settled", "case", _only_rolling, when=all_of(*whens))
+            _settled("case", _only_rolling, when=all_of(*whens))
             for whens in ((from_floor, _does_not_sink, slips_first), (_does_not_sink, lifts_first))
         ),
-        Criterion("settled", "omega_c", _reads_flow, when=_does_not_sink),
-        *(Criterion("thresholds", end, _range, when=first) for end, first in _ENDS_OF_RANGES),
-        Criterion(
-            "thresholds",
+        _settled("omega_c", _reads_flow, when=_does_not_sink),
+        *(_thresholds(end, _range, when=first) for end, first in _ENDS_OF_RANGES),
+        _thresholds(
             "lifts",
-            _ends_unloading,
+            lambda m: analytic.operating_limit(m.parameters).end is End.UNLOADING,
             when=lambda m: _range(m) > 0,
             by="analytic.operating_limit",
         ),
@@ -262,19 +249,16 @@ CLAIMS = (
         "Section 5.3, (85)",
         "The wall carries the ball at flows above ω₀₂, the limit at unloading; below, it slips and "
         "sinks.",
-        Criterion("settled", "case", _rides_or_sinks, when=given(start="on the wall")),
-        Criterion("thresholds", "omega_02", _unloads, when=given(side="from above"), by=_UNLOADS),
+        _settled("case", _rides_or_sinks, when=given(start="on the wall")),
+        _thresholds("omega_02", _unloads, when=given(side="from above"), by=_UNLOADS),
     ),
     claim(
         "fig-13-left",
         "Fig. 13, left",
         "For η < j the ball jumps up to ω₀ above ω₀₄, down below ω₀₂, and keeps to its branch in "
         "between.",
-        *(
-            Criterion("hysteresis", "case", _loop_case, when=_jumps(way), by=_STABLE)
-            for way in (1, -1, 0)
-        ),
-        Criterion("hysteresis", "omega_c", _loop_reading, by="(32), (38), (46)"),
+        *(_loop("case", _loop_case, when=_jumps(way), by=_STABLE) for way in (1, -1, 0)),
+        _loop("omega_c", _loop_reading, by="(32), (38), (46)"),
         text=Text.CORRECTED,
         reason="Section 5.3 prints that the flow can be read again above ω₀₂; on the way up that "
         "is above ω₀₄.",
@@ -284,20 +268,19 @@ CLAIMS = (
         "Fig. 13, right; section 5.3",
         "Carried by the wall while ω₀ falls below ω₀₂, the ball slips, sinks, hits the floor, and "
         "ends slipping or rolling at both points.",
-        Criterion("unloading", "case", _end_case, when=given(start=UNLOADED), by=_SIMULATED),
-        *criteria(
-            "unloading", ("time", "landing_speed", "landing_impulse"), _at_event, by=_SIMULATED
+        _unloading("case", _end_case, when=given(start=UNLOADED), by=_SIMULATED),
+        *(
+            _unloading(quantity, _at_event, by=_SIMULATED)
+            for quantity in ("time", "landing_speed", "landing_impulse")
         ),
     ),
     claim(
         "push",
         "section 5.3",
         "A small push lifts the ball from SR to NR, where it stays off the floor.",
-        *(
-            Criterion("unloading", "case", _end_case, when=given(start=start), by=_SIMULATED)
-            for start in (UPWARDS, BY_SPIN)
-        ),
-        Criterion("unloading", "lift", _at_event, by=_SIMULATED),
+        _unloading("case", _end_case, when=given(start=UPWARDS), by=_SIMULATED),
+        _unloading("case", _end_case, when=given(start=BY_SPIN), by=_SIMULATED),
+        _unloading("lift", _at_event, by=_SIMULATED),
     ),
     claim(
         "design-limit",
@@ -306,22 +289,22 @@ CLAIMS = (
         "nominal value, at the lowest or the highest limit of that tolerance. ω₀₂ follows the "
         "wall's friction by the design's sensitivity.",
         *(
-            Criterion("thresholds", end, _exact, when=all_of(first, _stokes), by=_DESIGN)
+            _thresholds(end, partial(_covered, off=0), when=all_of(first, by_stokes), by=_DESIGN)
             for end, first in _ENDS_OF_RANGES
         ),
         *(
-            Criterion("thresholds", end, predict, when=all_of(first, _stokes, _one_end), by=_DESIGN)
+            _thresholds(end, predict, when=all_of(first, by_stokes, _one_end), by=_DESIGN)
             for end, first in _ENDS_OF_RANGES
             for predict in _WITHIN_TOLERANCES
         ),
-        Criterion("thresholds", "omega_02", _by_sensitivity, by=f"{_DESIGN}.sensitivities"),
+        _thresholds("omega_02", _by_sensitivity, by=f"{_DESIGN}.sensitivities"),
     ),
     claim(
         "design-reading",
         "extension, Fig. 13",
         "Where a flow has several stable readings, the meter shows the lowest while the flow rises "
         "and the highest while it falls, as its design says.",
-        Criterion("hysteresis", "omega_c", _loop_reading_of_design, by=f"{_DESIGN}.readings"),
+        _loop("omega_c", _reading_of_design, by=f"{_DESIGN}.readings"),
     ),
     claim(
         "time-constants",
