@@ -1,5 +1,4 @@
-"""What the system is: parameters, kinematics, cases, flow, and the trajectories that simulators
-return."""
+"""What the system is: parameters, kinematics, cases, flow, and what simulators return."""
 
 import importlib
 from typing import TYPE_CHECKING, Any
@@ -29,8 +28,7 @@ __all__ = [*_MODULES]
 
 
 def __getattr__(name: str) -> Any:
-    """A name when it is asked for: the help of a command needs none of the arrays that most of them
-    are made of."""
+    """A name when it is asked for: the help of a command needs no arrays."""
     if name in _MODULES:
         return globals().setdefault(
             name, getattr(importlib.import_module(f"model.{_MODULES[name]}"), name)

@@ -17,8 +17,7 @@ class Contact(Enum):
 
 
 class Case(IntEnum):
-    """Kinematic case: first letter for the floor (A), second for the wall (B); the value is the
-    HDF5 code."""
+    """Kinematic case: a letter for the floor (A), one for the wall (B); its value in files."""
 
     RR = 0
     RS = 1
@@ -32,8 +31,7 @@ class Case(IntEnum):
 
     @classmethod
     def _missing_(cls, value: object) -> Case:
-        """Let ``Case("SS")`` give the case of that name; raise `InputError` for a name or number of
-        no case."""
+        """Let ``Case("SS")`` give the case of that name; raise `InputError` if there is none."""
         if isinstance(value, str) and value in cls.__members__:
             return cls[value]
         raise InputError(f"case = {value!r} must be one of {', '.join(cls.__members__)}")

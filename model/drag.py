@@ -1,5 +1,4 @@
-"""The drag of the fluid on the ball: -m c(|w|) w, with w the velocity of the ball's centre relative
-to the fluid.
+"""The drag of the fluid on the ball: -m c(|w|) w, with w its velocity relative to the fluid.
 
 c(|w|) = c C_D(Re) Re/24 with Re = 2 r |w|/nu_f: Stokes' coefficient c (10) times what the drag of
 the sphere is greater by. A law is that factor as a function of Re:

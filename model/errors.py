@@ -11,8 +11,7 @@ MOST_NAMES = 20
 
 
 class InputError(ValueError):
-    """A user's mistake: the message is one line naming the field, the value, its unit and the
-    range."""
+    """A user's mistake: the message is one line naming field, value, unit and range."""
 
 
 class StorageError(InputError):

@@ -1,5 +1,4 @@
-"""Files that are whole or not there: written under a temporary name beside theirs, which they get
-at the end."""
+"""Files that are whole or not there: written under a temporary name beside theirs."""
 
 from __future__ import annotations
 
@@ -20,8 +19,7 @@ _under_way: set[Path] = set()
 
 
 def make_directory(path: Path) -> None:
-    """Make a directory where there is none; raises `StorageError` if that, or writing in it, is not
-    allowed."""
+    """Make a directory where there is none; `StorageError` if that, or writing in it, fails."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -42,15 +40,13 @@ def why_no_file(path: str | Path) -> str:
 
 
 def check_ours(path: Path, beside: Path) -> None:
-    """Raise `StorageError` if `path` exists and `beside`, which this program always writes with it,
-    does not."""
+    """Raise `StorageError` if `path` exists without `beside`, which this program writes with it."""
     if path.exists() and not beside.exists():
         raise StorageError(f"{path} is not of this program: choose another directory with --output")
 
 
 def check_writable(path: str | Path) -> None:
-    """Raise `StorageError` if a file of that name could not be written: better before a long run
-    than after."""
+    """Raise `StorageError` if that file could not be written: better before a run than after."""
     folder = Path(path).parent
     try:
         if not folder.is_dir():
@@ -86,8 +82,7 @@ def write_bytes(path: Path, content: bytes) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file as `write_bytes` does; a file name in it that is no UTF-8 stays as it
-    is."""
+    """Write a text as `write_bytes` does; a file name in it that is no UTF-8 stays as it is."""
     write_bytes(path, text.encode("utf-8", "surrogateescape"))
 
 

@@ -24,8 +24,7 @@ _COLUMNS = {"time": ("s", ["t"]), "omega_0": ("rad s-1", ["omega0", "omega", "ω
 
 @dataclass(frozen=True, eq=False)
 class Flow:
-    """The flow omega_0(t): a piecewise linear function of time, which may jump between pieces, plus
-    sine waves.
+    """The flow omega_0(t): piecewise linear, with jumps between pieces, plus sine waves.
 
     Piece k holds from ``start[k]`` on and is ``value[k] + slope[k] (t - start[k])``; before the
     first start its value holds. Make one with `steady`, `ramp`, `staircase`, `sampled`, `sine`,
@@ -77,8 +76,7 @@ class Flow:
     def ramp(
         cls, omega_start: float, omega_end: float, duration: float, t_start: float = 0.0
     ) -> Self:
-        """From omega_start to omega_end linearly within `duration` seconds from t_start, held on
-        either side."""
+        """From omega_start to omega_end linearly within `duration`, s, from t_start; else held."""
         check_number("duration", duration, "s", POSITIVE)
         check_number("t_start", t_start, "s", NOT_NEGATIVE)
         return cls.sampled([t_start, t_start + duration], [omega_start, omega_end], kind="ramp")
@@ -127,8 +125,7 @@ class Flow:
 
     @classmethod
     def from_csv(cls, path: str | Path, longest_interval: float | None = None) -> Self:
-        """A measured flow: lines of time in s and omega_0 in rad s-1, with linear interpolation
-        between them.
+        """A measured flow: lines of time in s and omega_0 in rad s-1, linear in between.
 
         Commas, semicolons or white space separate the two; numbers may have decimal commas between
         semicolons or tabs. A first line without numbers is the head: columns are found by their
@@ -165,8 +162,7 @@ class Flow:
     def _from_pieces(
         cls, kind: str, start: Iterable[float], value: Iterable[float], slope: Iterable[float]
     ) -> Self:
-        """A flow that is linear from each start on, without waves; `InputError` for values or times
-        that cannot be."""
+        """A flow that is linear from each start on; `InputError` for wrong values or times."""
         t = [
             check_number(f"time of flow sample {k}", time, "s", REACH)
             for k, time in enumerate(start)

@@ -1,5 +1,4 @@
-"""HDF5 files that are either complete or absent, and that are read only if nothing in them has
-changed.
+"""HDF5 files that are complete or absent, and read only if nothing in them has changed.
 
 Each ends with the SHA-256 checksum of all that comes before, which HDF5 itself ignores. It is
 compared before HDF5 looks at the file: on damaged metadata the library may hang, and give wrong
@@ -101,8 +100,7 @@ def column(stored: h5py.Dataset) -> npt.NDArray[Any]:
 def write_columns(
     file: h5py.File, columns: Mapping[str, Sequence[Any] | npt.NDArray[Any]], *scales: str
 ) -> dict[str, h5py.Dataset]:
-    """Write columns of numbers or of text; the first ones, `scales`, are the scales of the
-    dimensions of the others."""
+    """Write columns of numbers or text; the first, `scales`, are the scales of the others."""
     written: dict[str, h5py.Dataset] = {}
     for name, values in columns.items():
         is_text = np.size(values) and isinstance(np.ravel(values)[0], str)

@@ -23,8 +23,7 @@ from model.parameters import Parameters, Range, check_number
 
 
 class State(NamedTuple):
-    """The state (19) of a ball, or its rate of change: floats, or arrays of one shape for many
-    states.
+    """The state (19) of a ball, or its rate: floats, or arrays of one shape for many states.
 
     A tuple of eight, which is taken wherever a state is asked for: ``State(omega_c=3.0,
     slip_x=-1.0)``."""
@@ -83,8 +82,7 @@ def state_units(p: Parameters) -> Array:
 
 
 def check_place(x: State, p: Parameters, depth: float = 0.0) -> None:
-    """`InputError` for a ball deeper in floor or wall than `depth`, m, or on the axis, where polar
-    coordinates end."""
+    """`InputError` for a ball deeper in floor or wall than `depth`, m, or on the axis."""
     check_number("y", x.y, "m", Range(0.0 - depth), "to be above the floor it")
     check_number(
         "h", x.h, "m", Range(0.0 - depth, p.R, below=True), "to be between wall and axis it"
@@ -139,8 +137,7 @@ def frame(theta: Array | float) -> Array:
 
 
 def angular_velocity(x: npt.ArrayLike, p: Parameters) -> Array:
-    """Angular velocity of the ball (4) in the co-rotating frame, shape (..., 3), with rho for R off
-    the wall."""
+    """Angular velocity of the ball (4) in the co-rotating frame, (..., 3), with rho for R."""
     _, v_y, omega_c, slip_x, slip_y, slip_z, h, _ = State.of(x)
     roll = (p.R - h) / p.r * omega_c
     return np.stack([roll + slip_x, slip_y - roll, v_y / p.r + slip_z], axis=-1)
@@ -176,8 +173,7 @@ def to_world(x: npt.ArrayLike, theta: npt.ArrayLike, p: Parameters) -> Motion:
 
 
 def from_world(motion: Motion, p: Parameters) -> tuple[State, Array]:
-    """States, as columns, and azimuths theta (...) of a motion in the world frame; the inverse of
-    `to_world`.
+    """States, as columns, and azimuths theta (...) of a motion in the world; inverse of `to_world`.
 
     On the axis itself the orbit has no direction: theta is 0 there and omega_c is nan.
     """
@@ -200,7 +196,6 @@ def _matrix_product(matrix: Array, vector: Array) -> Array:
 
 
 def tangent(radius: float, azimuth: float) -> tuple[Array, Array]:
-    """Point and inward normal, each (3,), of the plane that touches a cylinder about the z axis
-    there."""
+    """Point and inward normal, each (3,), of the plane that touches a cylinder about z there."""
     normal = -np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
     return -radius * normal, normal

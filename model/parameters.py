@@ -62,8 +62,7 @@ REACH = Range(-1e12, 1e12)
 def check_number(
     name: str, value: Any, unit: str, allowed: Range = ANY, meaning: str = ""
 ) -> float:
-    """Return `value` as a float; `InputError` if it is not a finite real number in the allowed
-    range."""
+    """Return `value` as a float; `InputError` unless it is a finite number in the allowed range."""
     try:
         if isinstance(value, bool | str) or not hasattr(value, "__float__"):
             raise TypeError
@@ -131,8 +130,7 @@ def _quantity(symbol: str, unit: str, meaning: str, allowed: Range, **default: A
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters:
-    """Everything the model depends on, in SI units: Table 1 of the paper, and the law of drag
-    (`model.drag`).
+    """All the model depends on, in SI units: Table 1 of the paper, and the law of drag.
 
     QUANTITIES
 
@@ -176,8 +174,7 @@ class Parameters:
         NOT_NEGATIVE,
         default=0.0,
     )
-    """Time stepping and MuJoCo take it; closed forms and the event-driven simulation leave it out,
-    and say so."""
+    """Time stepping and MuJoCo take it; closed forms and the event-driven simulation don't."""
     drag: str = laws.STOKES
     """The law of drag, one of `model.drag.LAWS`."""
 
@@ -227,8 +224,7 @@ class Parameters:
         j: float = 0.4,
         **rest: Any,
     ) -> Self:
-        """Parameters of a uniform ball in a fluid: mass, Stokes drag by (10), gravity less
-        buoyancy.
+        """A uniform ball in a fluid: mass, Stokes drag by (10), gravity less buoyancy.
 
         Parameters
         ----------
@@ -261,8 +257,7 @@ class Parameters:
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> Self:
-        """Build from a mapping: the parameters, or the arguments of `from_fluid` with a ``fluid``
-        table.
+        """From a mapping of parameters, or of arguments of `from_fluid` with a ``fluid`` table.
 
         The table ``fluid`` holds nu_f, rho_f, rho_b and optionally gravity; m, g, c and
         density_ratio then follow from it and may not be given. Raises `InputError` for an unknown,
@@ -305,8 +300,7 @@ class Parameters:
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """Read a TOML file; raises `StorageError` if it can't be read, `InputError` for what it
-        says."""
+        """Read a TOML file; `StorageError` if it can't be read, `InputError` for what it says."""
         values = read_toml(path)
         try:
             return cls.from_mapping(values)

@@ -1,5 +1,4 @@
-"""The HDF5 form of trajectories, flat, whole or not there at all: one run a file, or the runs of a
-batch in one.
+"""The HDF5 form of trajectories, flat and whole: one run a file, or the runs of a batch in one.
 
 `save_batch` writes many short runs along a dimension ``run`` where each has a name: ``FILE/NAME``
 is read as if it were a file of its own. Readers trust nothing: links that lead out of the file are
@@ -66,8 +65,7 @@ def write(run: Trajectory, file: h5py.File) -> None:
 
 
 def save_batch(runs: Mapping[str, Trajectory], path: str | Path) -> None:
-    """Write runs by name into one file; raises `StorageError` if that can't be done, leaving
-    nothing behind.
+    """Write runs by name into one file; raises `StorageError`, leaving nothing behind.
 
     Columns have shape (run, sample, ...) and (run, event, ...); behind the samples and events that
     a run has they are filled with nan, and cases with -1. What a file of one run says in attributes
@@ -118,8 +116,7 @@ def load(path: str | Path) -> Trajectory:
 
 
 def contents(path: str | Path) -> tuple[str, list[str]]:
-    """The version of dualball that wrote a file, and the names of the runs in it; no names if it
-    holds a single run.
+    """The version of dualball that wrote a file, and the names of its runs; none of a single run.
 
     Raises `StorageError` as `load` does.
     """
@@ -134,8 +131,7 @@ def exists(path: str | Path) -> bool:
 
 
 def load_runs(path: str | Path) -> dict[str, Trajectory]:
-    """All runs of a file by name; the name of a single one is empty. Raises `StorageError` as
-    `load` does."""
+    """Runs of a file by name, which of a single one is empty. Raises `StorageError` as `load`."""
     with reading(path) as file:
         if file.attrs.get("schema") != BATCH:
             return {"": _read(file)}
@@ -154,8 +150,7 @@ def load_runs(path: str | Path) -> dict[str, Trajectory]:
 
 
 def _write_common(file: h5py.File, schema: str, version: int) -> dict[str, h5py.Dataset]:
-    """Write schema and axes, which all files have; return the HDF5 dimension scales by name, so far
-    of axes."""
+    """Write schema and axes, which all files have; return the dimension scales by name."""
     file.attrs.update(schema=schema, schema_version=version)
     axis = file.create_dataset("axis", data=AXES, dtype=_TEXT)
     axis.attrs.update(AXIS_ATTRIBUTES)
@@ -175,8 +170,7 @@ def _create_column(
     scales: dict[str, h5py.Dataset],
     **layout: Any,
 ) -> None:
-    """Create a column along the first of these dimensions; it becomes the HDF5 scale of one that
-    has none yet."""
+    """Create a column along these dimensions; it becomes the scale of one that has none yet."""
     column = file.create_dataset(
         meta["name"], dtype=_CASE_ENUM if meta["dtype"] is np.int8 else np.float64, **layout
     )
@@ -232,8 +226,7 @@ def _trajectory(
 
 
 def _attribute(texts: Mapping[str, Any], name: str, kind: type) -> Any:
-    """The attribute `name` of a file: a text as it is (kind str), or a dict decoded from JSON;
-    `StorageError` else."""
+    """The attribute `name` of a file: a str, or a dict from JSON; else raises `StorageError`."""
     value = texts.get(name)
     if not isinstance(value, str):
         raise StorageError(f"its attribute {name!r} is missing")
@@ -251,8 +244,7 @@ def _attribute(texts: Mapping[str, Any], name: str, kind: type) -> Any:
 def _table(
     file: h5py.File, of: type[Trajectory] | type[Events], leading: int
 ) -> dict[str, npt.NDArray[Any]]:
-    """Read and check all columns of a table whose arrays have `leading` dimensions before those of
-    one entry."""
+    """Read and check all columns of a table of `leading` dimensions before those of one entry."""
     values = {}
     for column, meta in columns(of).items():
         name, stored = meta["name"], dataset(file, meta["name"])

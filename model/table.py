@@ -1,5 +1,4 @@
-"""Tables of numbers as text: what separates columns, what numbers look like, and a head of names
-with units."""
+"""Tables of numbers as text: separators, numbers, and a head of names with units."""
 
 from __future__ import annotations
 
@@ -26,8 +25,7 @@ _SHORT = {"second": "s", "seconds": "s", "sec": "s", "radian": "rad", "radians":
 
 
 def fields(line: str) -> list[str]:
-    """The fields of a line without its comment; between semicolons and tabs a comma is a decimal
-    one."""
+    """Fields of a line without its comment; between semicolons or tabs a comma is a decimal one."""
     line = line.partition("#")[0]
     for separator in ";\t":
         if separator in line:
@@ -62,8 +60,7 @@ def _factors(unit: str) -> list[str]:
 def columns(
     head: Sequence[str], known: Mapping[str, tuple[str, Sequence[str]]], needed: Iterable[str]
 ) -> dict[str, int]:
-    """The column of each quantity in a table, from its head; `known` has the unit and other names
-    of each quantity.
+    """The column of each quantity in a table, from its head; `known` has its unit and other names.
 
     Labels are as ``time``, ``t (s)``, ``omega_0 [rad/s]`` or ``t in s``. Raises `InputError` for
     another unit, a quantity that comes twice, or one that is needed and isn't there."""

@@ -54,8 +54,7 @@ def shortest_time(
 def check_timestep(
     timestep: float, p: Parameters, flow: Flow, t_end: float, c: Callable[[float], float], x0: State
 ) -> None:
-    """`InputError` for a step beyond half of `shortest_time`; every engine that takes steps is held
-    to this."""
+    """`InputError` for a step beyond half of `shortest_time`, to which every engine is held."""
     shortest, name = shortest_time(p, flow, t_end, c, x0)
     if timestep > shortest / 2:
         raise InputError(

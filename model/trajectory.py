@@ -79,8 +79,7 @@ class Header:
     """UTC time."""
 
     def attributes(self) -> dict[str, Any]:
-        """What a file says of itself: its conventions, each parameter, and all but the MJCF as text
-        or JSON."""
+        """What a file says of itself: each parameter, and all but the MJCF as text or JSON."""
         texts = {
             f.name: getattr(self, f.name) for f in dataclasses.fields(self) if f.name != "mjcf"
         }
@@ -149,8 +148,7 @@ class Trajectory:
         return [Case(code) for code in self.case]
 
     def phases(self) -> list[tuple[Case, float, float]]:
-        """The cases that the run goes through in order, with the times of the first and last sample
-        in each, s."""
+        """The cases in order, with the times of the first and last sample in each, s."""
         starts = np.flatnonzero(np.diff(self.case, prepend=-1))
         ends = np.append(starts, len(self.case))[1:] - 1
         stretches = zip(
@@ -164,8 +162,7 @@ class Trajectory:
         return not self.header.failure
 
     def to_xarray(self) -> xarray.Dataset:
-        """The trajectory as xarray opens its file: units, names of the cases, events, where it
-        comes from.
+        """The trajectory as xarray opens its file: units, cases, events, where it comes from.
 
         Raises `InputError` if xarray or h5netcdf, optional dependencies, aren't installed."""
         try:
@@ -240,8 +237,7 @@ class Events:
 
 
 def columns(of: type[Trajectory] | type[Events]) -> dict[str, Mapping[str, Any]]:
-    """Metadata of every array column, in order: name in a file, units, long_name, equation, shape,
-    dtype."""
+    """Metadata of columns, in order: name in a file, units, long_name, equation, shape, dtype."""
     table = "event_" if of is Events else ""
     fields = [f for f in dataclasses.fields(of) if "units" in f.metadata]
     return {f.name: {"name": table + f.name.removesuffix("_case"), **f.metadata} for f in fields}
@@ -258,8 +254,7 @@ COMPONENTS: dict[str, tuple[str, str]] = {
 
 
 def component(of: Any, name: str) -> Array:
-    """A number by its name, such as omega_c or force_Ax, at each sample of a trajectory or its data
-    set, shape (n,)."""
+    """A number by its name, as force_Ax, at each sample of a trajectory or its data set, (n,)."""
     column, axis = COMPONENTS[name]
     values = np.asarray(getattr(of, column))
     return values[:, AXES.index(axis)] if axis else values
@@ -286,8 +281,7 @@ SAMPLE = np.dtype([(name, meta["dtype"], meta["shape"]) for name, meta in _SAMPL
 
 
 def samples(time: Array, theta: Array, x: State, p: Parameters) -> npt.NDArray[np.void]:
-    """Samples (n,) of dtype `SAMPLE` with gaps and slip speeds as the states say; forces and case
-    are for the caller.
+    """Samples (n,) of dtype `SAMPLE` with gaps and slip speeds; forces and case are for the caller.
 
     time, theta and the columns of x have shape (n,).
     """

@@ -1,5 +1,4 @@
-"""What xarray reads a run with for ``engine="dualball"``: an entry point in pyproject.toml leads it
-here."""
+"""What xarray reads a run with for ``engine="dualball"``, by an entry point of pyproject.toml."""
 
 from __future__ import annotations
 
@@ -17,8 +16,7 @@ from model.trajectory import COMPONENTS, FLUID, Trajectory, attributes, columns
 
 
 class RunBackend(BackendEntrypoint):
-    """A run, or one of a batch as ``FILE/KEY``, as columns along the time alone: its table has one
-    row a sample."""
+    """A run, or one of a batch as ``FILE/KEY``, as columns along the time: one row a sample."""
 
     description = "Runs of dualball, one row a sample"
     open_dataset_parameters = ("filename_or_obj", "drop_variables")
@@ -26,8 +24,7 @@ class RunBackend(BackendEntrypoint):
     def open_dataset(
         self, filename_or_obj: Any, *, drop_variables: str | Iterable[str] | None = None
     ) -> xarray.Dataset:
-        """Open a run's file: the columns of `Trajectory.table` along the time, cases by name,
-        without the events.
+        """A run's file: the columns of `Trajectory.table` along the time, cases by name, no events.
 
         Raises `StorageError`, in one line, for a file that isn't a run or is damaged.
         """

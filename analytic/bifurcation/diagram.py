@@ -1,5 +1,4 @@
-"""Bifurcations over omega_0: the thresholds omega_01 ... omega_04, eta_cr, and what meets there
-(section 5)."""
+"""Bifurcations over omega_0: the thresholds omega_01 ... omega_04, eta_cr (section 5)."""
 
 from __future__ import annotations
 
@@ -17,17 +16,14 @@ from model.errors import check_type
 
 @dataclass(frozen=True)
 class Thresholds:
-    """The flows omega_0 > 0 at which stationary solutions change, rad s-1, and eta_cr; nan for what
-    doesn't exist."""
+    """Flows omega_0 > 0 at which stationary solutions change, rad s-1, and eta_cr; nan if none."""
 
     omega_01: float
-    """(84): RR gives way to SS. nan for eta > j, where A_y would have to be negative. 0 for mu =
-    0."""
+    """(84): RR ends in SS. nan for eta > j, where A_y would have to be negative. 0 for mu = 0."""
     omega_02: float
     """(85): the wall begins to carry the weight. nan for eta = 0: a smooth wall never does."""
     omega_03: float
-    """(86): the gyroscopic moment carries the weight, and RR lifts off the floor if nothing ended
-    it before."""
+    """(86): the gyroscopic moment carries the weight, and RR lifts off, if it lasts so long."""
     omega_04: float
     """(88): the fold of SS. nan unless eta_cr < eta < j, mu > 0 and c > 0."""
     eta_cr: float
@@ -38,8 +34,7 @@ class Thresholds:
 
 
 def thresholds(p: Parameters) -> Thresholds:
-    """The flows in rad s-1 at which stationary solutions change, by name; nan for what doesn't
-    exist. (84)-(88)
+    """Flows, rad s-1, at which stationary solutions change; nan for none. (84)-(88)
 
     p.omega_0 plays no part. The law of drag shifts omega_04 and eta_cr only.
     """
@@ -55,8 +50,7 @@ def thresholds(p: Parameters) -> Thresholds:
 def threshold_curves(
     p: Parameters, mu: npt.ArrayLike, eta: npt.ArrayLike, released: bool = False
 ) -> dict[str, Array]:
-    """The fields of `Thresholds` over arrays mu and eta, with Omega = omega sqrt(R/g); for the
-    lines of Figs. 7, 8.
+    """The fields of `Thresholds` over arrays mu and eta, with Omega = omega sqrt(R/g) (Figs. 7, 8).
 
     `released` drops (12), as Fig. 12 does: omega_01 and omega_04 are then continued beyond eta = j
     as far as the equations have solutions."""
@@ -74,8 +68,7 @@ def threshold_curves(
 def curves_without_drag(
     j: float, mu: npt.ArrayLike, eta: npt.ArrayLike, released: bool = False
 ) -> dict[str, Array]:
-    """omega_01, omega_02 and omega_03, in which drag plays no part, as `threshold_curves` gives
-    them."""
+    """omega_01 to omega_03, in which drag plays no part, as `threshold_curves` gives them."""
     mu, eta = (np.asarray(a, dtype=float) for a in np.broadcast_arrays(mu, eta))
     divisor = mu * eta * (1 + j) + j - eta
     real = (divisor > 0) & ((eta <= j) | released)
@@ -88,8 +81,7 @@ def curves_without_drag(
 
 
 def number_of_folds(p: Parameters) -> int:
-    """Folds along the branch of SS, counted: after Proposition 7 one for eta_cr < eta < j, and none
-    for less eta.
+    """Folds along the branch of SS, counted: by Proposition 7 one for eta_cr < eta < j, else none.
 
     By the changes of sign of `slope`, a search that assumes nothing. `InputError` as
     `check_branch`."""
@@ -101,8 +93,7 @@ def number_of_folds(p: Parameters) -> int:
 
 
 def critical_drag(p: Parameters) -> float:
-    """The drag c in s-1 at which p.eta is eta_cr, (87): for less of it SS has a fold. eta_cr rises
-    like c^2.
+    """Drag c, s-1, at which p.eta is eta_cr (87), which rises like c^2: for less SS has a fold.
 
     inf for the quadratic law, under which there is always a fold. `InputError` unless 0 < eta < j,
     mu > 0 and p.c > 0; else p.c plays no part."""
@@ -153,8 +144,7 @@ def double_points(p: Parameters, equal: bool = False) -> list[DoublePoint]:
 
 
 class Exists(IntFlag):
-    """Which stationary solutions exist: the labels of the regions of Figs. 7 and 8 (RS exists on
-    omega_0 = 0 only)."""
+    """Which stationary solutions exist: regions of Figs. 7, 8 (RS exists for omega_0 = 0 only)."""
 
     RR = 1
     SS = 2
@@ -169,8 +159,7 @@ class Exists(IntFlag):
 def case_map(
     p: Parameters, mu: npt.ArrayLike, eta: npt.ArrayLike, omega_0: npt.ArrayLike
 ) -> npt.NDArray[np.uint8]:
-    """Flags `Exists` at every point of a plane of parameters, shape (number of eta, number of
-    omega_0).
+    """Flags `Exists` over a plane of parameters, shape (number of eta, number of omega_0).
 
     Parameters
     ----------
@@ -202,8 +191,7 @@ def case_map(
 
 
 def wall_spin(state: State, p: Parameters) -> Real:
-    """omega_x^0 = slip_x + omega_c R/r of (91), rad s-1: the spin on the wall, ordinate of Figs.
-    9-12."""
+    """omega_x^0 = slip_x + omega_c R/r (91), rad s-1: the spin on the wall in Figs. 9-12."""
     return state.slip_x + p.R / p.r * state.omega_c
 
 

@@ -1,5 +1,4 @@
-"""The ball as a flowmeter (section 5.3): its characteristic curve omega_c(omega_0), and its
-range."""
+"""The ball as a flowmeter (section 5.3): its characteristic omega_c(omega_0), and range."""
 
 from __future__ import annotations
 
@@ -38,8 +37,7 @@ class OperatingLimit:
 
 
 def operating_limit(p: Parameters) -> OperatingLimit:
-    """The largest omega_0 below which rolling at both points (RR) is the ball's only lasting
-    motion, and what ends it.
+    """Largest omega_0 below which rolling at both points (RR) is all that lasts, and what ends it.
 
     Section 5.3. For eta < j it ends where RR ends in slipping, omega_01. For eta >= j RR itself
     goes on to omega_03, where the floor lets go, but it is alone up to omega_02 only: a flow beyond
@@ -61,8 +59,7 @@ def operating_range(p: Parameters) -> float:
 
 
 def reading_range(p: Parameters) -> float:
-    """The largest omega_0 in rad s-1 up to which the ball reads the flow itself, omega_c = omega_0,
-    in every motion.
+    """Largest omega_0, rad s-1, up to which the ball reads omega_c = omega_0 in every motion.
 
     omega_01 for eta < j. inf for eta >= j, where RR, SR and NR all go round with the fluid, and on
     a smooth floor, which can't hold the ball back. 0 without drag."""
@@ -73,8 +70,7 @@ def reading_range(p: Parameters) -> float:
 
 
 def unloading_limit(p: Parameters) -> float:
-    """omega_02 in rad s-1: a ball on the wall (NR) stays there while omega_0 is above; below it
-    slips, sinks and lands.
+    """omega_02 in rad s-1: a ball on the wall (NR) stays there above; below it sinks and lands.
 
     nan for a smooth wall, which carries no ball.
     """
@@ -82,8 +78,7 @@ def unloading_limit(p: Parameters) -> float:
 
 
 def characteristic_slope(p: Parameters, case: Case | None = None) -> float:
-    """d omega_c/d omega_0 along the attractors at p.omega_0: 1 in RR, SR and NR; in SS from (38)
-    and (41), (89).
+    """d omega_c/d omega_0 along the attractors at p.omega_0: 1 but in SS, (38), (41), (89).
 
     Parameters
     ----------
@@ -111,8 +106,7 @@ def characteristic_slope(p: Parameters, case: Case | None = None) -> float:
 
 
 def slope_jump(p: Parameters) -> float:
-    """By how much the slope of the characteristic jumps at omega_01, where slipping sets in: to
-    zero, by -1.
+    """Jump of the characteristic's slope at omega_01, where slipping sets in: by -1, to zero.
 
     The first bit of slip turns the friction at the floor without changing the load: omega_c doesn't
     rise at first."""
@@ -121,8 +115,7 @@ def slope_jump(p: Parameters) -> float:
 
 
 def mean_slope(p: Parameters) -> float:
-    """Mean slope of the characteristic between omega_01 and omega_02, along SS from RR: "very
-    small" (section 5.3).
+    """Mean slope of the characteristic from omega_01 to omega_02, along SS: "very small" (5.3).
 
     1 for eta <= eta_cr, where the branch arrives at omega_02 without a lag. `InputError` unless 0 <
     eta < j, mu, c > 0."""

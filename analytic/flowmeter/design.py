@@ -1,5 +1,4 @@
-"""Design of a flowmeter: sensitivity of its limits to its data, its reading with tolerances, the
-best choice.
+"""Design of a flowmeter: sensitivity of limits to data, reading with tolerances, best choice.
 
 Everything rests on `thresholds`, `operating_range` and the branch of SS, whatever the law of drag.
 A meter is given as a function `make` that takes values by name and returns `Parameters`:
@@ -39,8 +38,7 @@ THRESHOLDS = ("omega_01", "omega_02", "omega_03", "omega_04")
 _LOG_STEP = 1e-3
 """Of the differences, in the logarithm of a value."""
 _TIE = 1e-3
-"""Weight of the logarithm of the response time relative to the margin: it decides between equal
-margins."""
+"""Weight of the logarithm of the response time: it decides between equal margins."""
 
 
 @dataclass(frozen=True)
@@ -49,8 +47,7 @@ class Sensitivity:
     by one."""
 
     value: float
-    """nan where the threshold doesn't exist on both sides, or the value may not be changed to one
-    of them."""
+    """nan where the threshold doesn't exist, or the value isn't allowed, on both sides."""
     error: float
     """Estimated from differences of two widths."""
 
@@ -86,8 +83,7 @@ def sensitivities(make: Make, at: Mapping[str, float]) -> dict[str, dict[str, Se
 def corners(
     make: Make, at: Mapping[str, float], tolerances: Mapping[str, float]
 ) -> Iterator[Parameters]:
-    """The meter with every value at one end of its tolerance, which is relative: x (1 - t) or x (1
-    + t).
+    """The meter with every value at an end of its relative tolerance: x (1 - t) or x (1 + t).
 
     Limits and readings are monotonic in friction and size, but for a ridge of the operating limit
     at eta = j; so their extremes over all that the tolerances allow are at corners. A test samples
@@ -100,16 +96,14 @@ def corners(
 
 
 def threshold_spread(meters: Sequence[Parameters]) -> dict[str, Interval]:
-    """Lowest and highest value of each threshold over some meters, rad s-1; nan if one of them
-    doesn't have it."""
+    """Lowest and highest value of each threshold over some meters, rad s-1; nan if one lacks it."""
     each = np.array([[getattr(bifurcation.thresholds(p), k) for k in THRESHOLDS] for p in meters])
     ends = each.min(axis=0).tolist(), each.max(axis=0).tolist()
     return {key: (low, high) for key, low, high in zip(THRESHOLDS, *ends, strict=True)}
 
 
 def readings(p: Parameters, omega_0: npt.ArrayLike) -> tuple[Array, Array]:
-    """The lowest and the highest omega_c of all stationary motions that attract, at flows omega_0
-    >= 0, rad s-1.
+    """Lowest and highest omega_c of the stationary motions that attract, at flows >= 0, rad s-1.
 
     They differ where the reading depends on the past (Fig. 13): the lowest is read while the flow
     rises slowly from rest, the highest while it falls. Only SS lags behind the flow, up to its
@@ -128,8 +122,7 @@ def readings(p: Parameters, omega_0: npt.ArrayLike) -> tuple[Array, Array]:
 
 
 def response_time(p: Parameters) -> float:
-    """Time constant (1 + 2j)/c in s with which a rolling ball follows a small change of the flow
-    (docs/theory.md, 9).
+    """Time constant (1 + 2j)/c, s, with which a rolling ball follows the flow (docs/theory.md, 9).
 
     inf for the quadratic law, whose drag has no part linear in the lag.
     """
@@ -173,8 +166,7 @@ def best(
     seed: int = 0,
     tell: Callable[[float], object] = float,
 ) -> Choice:
-    """The meter within the bounds whose operating range exceeds the fastest flow by the largest
-    factor.
+    """The meter within the bounds whose range exceeds the fastest flow by the largest factor.
 
     Among all that answer within `slowest_response`, s, the one with the largest margin at the worst
     corner of the tolerances; among equals the quickest. Differential evolution (scipy), as the
@@ -251,8 +243,7 @@ class Request:
 
 @dataclass(frozen=True)
 class Curve:
-    """Characteristic curve: lowest and highest reading at each flow, rad s-1, arrays of one
-    shape."""
+    """Characteristic: lowest and highest reading at each flow, rad s-1, arrays of one shape."""
 
     omega_0: Array
     meant: tuple[Array, Array]

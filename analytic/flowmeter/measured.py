@@ -41,8 +41,7 @@ class Fit:
     kink: float
     """omega_01 as such a flow."""
     u: dict[str, float]
-    """Relative standard uncertainties of `free`, factor and kink by the scatter; inf for what the
-    curve doesn't tell."""
+    """Relative standard uncertainties of `free`, factor and kink; inf if the curve doesn't tell."""
     off: Array
     """Relative deviation of each reading from theory, (n,)."""
 

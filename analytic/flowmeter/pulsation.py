@@ -1,5 +1,4 @@
-"""A ball that rolls at both points (RR) in a flow that pulsates: when it slips, and what it then
-reads on average.
+"""A ball that rolls at both points (RR) in a pulsating flow: when it slips, and its mean reading.
 
 The flow is omega_0 = p.omega_0 + amplitude sin(2 pi frequency t). While the ball rolls, omega_c
 pulsates about the mean of the flow exactly, with any law of drag: no error of the mean. The
@@ -26,15 +25,13 @@ from model.drag import STOKES
 from model.kinematics import TURNING
 
 PHASES, CLOSER = 360, 32
-"""Phases of a period at which slip is looked for; and in each of two refinements around the least
-margin."""
+"""Phases of a period at which slip is looked for, and in each of two refinements."""
 HARMONICS, FINE = 32, 128
 """Odd harmonics of the lag that are computed (drag is an odd function); those left out are some
 1e-6 of it, or `LEFT_OUT`."""
 LEFT_OUT = 1e-7
 LAG_STEPS, SOLVED = 50, 1e-9
-"""Most steps of Newton's method for it, and the largest residual, divided by the flow's
-acceleration."""
+"""Most steps of Newton's method, and the largest residual relative to the flow's acceleration."""
 ROUNDS, DEPTH, SETTLED, PERIODIC_RTOL = 100, 3, 1e-6, 1e-6
 """Of `mean_error`: most periods simulated, depth of Anderson's extrapolation, tolerance of the
 change in a period relative to the flow, and the integrator's rtol. The mean is then known to some
@@ -44,8 +41,7 @@ change in a period relative to the flow, and the integrator's rtol. The mean is 
 def swing(
     p: Parameters, amplitude: float, frequency: float, phase: npt.ArrayLike
 ) -> tuple[Array, Array]:
-    """omega_c and omega_0 in rad s-1 of RR in a periodic pulsation, at phases of the flow in rad,
-    same shape."""
+    """omega_c and omega_0 of RR in a pulsation, rad s-1, at phases of the flow, rad, same shape."""
     return _swing(
         p, amplitude, lag_harmonics(p, amplitude, frequency), np.asarray(phase, dtype=float)
     )
@@ -61,16 +57,14 @@ def _swing(
 
 
 def first_harmonic(p: Parameters, amplitude: float, frequency: float) -> complex:
-    """First harmonic of omega_c in `swing` divided by that of omega_0; with Stokes' law that is
-    `response.transfer`."""
+    """First harmonic of `swing` divided by that of omega_0; by Stokes' law `response.transfer`."""
     return complex(1 + 1j * lag_harmonics(p, amplitude, frequency, FINE)[0] / amplitude)
 
 
 def lag_harmonics(
     p: Parameters, amplitude: float, frequency: float, harmonics: int = HARMONICS
 ) -> npt.NDArray[np.complex128]:
-    """Complex amplitudes of the first odd harmonics of the lag D = omega_c - omega_0 in a periodic
-    RR (23), rad s-1.
+    """Complex first odd harmonics of the lag D = omega_c - omega_0 in a periodic RR (23), rad s-1.
 
     D' = -c(R |D|) D/(1+2j) - omega_0', at two phases of half a period for every harmonic. With
     Stokes' law there is one, and the first step of Newton's method has nothing left to do. Raises
@@ -95,8 +89,7 @@ def lag_harmonics(
 
 @functools.cache
 def _collocation(harmonics: int) -> tuple[Array, npt.NDArray[np.complex128], Array]:
-    """Phases of half a period, and matrices from values there to complex amplitudes and to
-    derivatives by the phase."""
+    """Phases of half a period; matrices from values there to amplitudes and to derivatives."""
     odd = np.arange(1, 2 * harmonics, 2)
     phase = np.linspace(0.0, math.pi, 2 * harmonics, endpoint=False)
     waves = np.exp(1j * phase[:, None] * odd)
@@ -109,8 +102,7 @@ _MARGINS = {"slip-stability": rolling_forces.slip_margin, "infeasible": rolling_
 
 
 def slip_onset(p: Parameters, frequency: float, leave_rolling: str = "slip-stability") -> float:
-    """The least amplitude in rad s-1 at which slip begins at some phase of the pulsation, frequency
-    > 0 in Hz.
+    """Least amplitude, rad s-1, at which slip begins at some phase; frequency > 0 in Hz.
 
     By the margin of `Settings.leave_rolling` along `swing`; on rough floors and at high frequencies
     "infeasible" gives a larger amplitude. 0 where the mean flow alone ends RR, inf without drag.
@@ -137,8 +129,7 @@ def slip_onset(p: Parameters, frequency: float, leave_rolling: str = "slip-stabi
 
 
 def slow_onset(p: Parameters) -> float:
-    """Low-frequency limit of `slip_onset`: the flow rises to omega_01 or omega_03, or falls to rest
-    (67)."""
+    """`slip_onset` at low frequency: the flow rises to omega_01 or omega_03, or falls to 0 (67)."""
     t = bifurcation.thresholds(p)
     return max(
         0.0, min((t.omega_01 if p.eta < p.j else t.omega_03) - abs(p.omega_0), abs(p.omega_0))
@@ -146,8 +137,7 @@ def slow_onset(p: Parameters) -> float:
 
 
 def fast_onset(p: Parameters) -> float:
-    """The limit of `slip_onset` for high frequencies, at which omega_c stands still and the lag is
-    that of the flow.
+    """`slip_onset` at high frequency, where omega_c stands still and the lag is the flow's.
 
     The least of (66), of (73) if the wall can turn the spin at that lag, and of the lag at which
     both cones are full."""
@@ -180,8 +170,7 @@ def mean_error(
     settled: float = SETTLED,
     leave_rolling: str = "slip-stability",
 ) -> float:
-    """Mean of omega_c over a period less p.omega_0, rad s-1, once the pulsation is periodic;
-    frequency in Hz.
+    """Mean of omega_c less p.omega_0, rad s-1, once the motion is periodic; frequency in Hz.
 
     0 if the ball rolls on; else from the gain of azimuth in the event-driven simulation. Each
     period starts from an extrapolation of the last few (Anderson's method), until the motion

@@ -1,5 +1,4 @@
-"""What a real fluid does beside the drag (9): its torque on the spinning ball, and more drag near a
-wall.
+"""What a real fluid does beside the drag (9): its torque on the ball, and more drag near a wall.
 
 The paper leaves both out, and so do the simulators; added mass and the pressure of the swirl are in
 `bifurcation.diagram`. They are estimates of how far the model can be trusted, for a ball far from
@@ -24,8 +23,7 @@ from model import Parameters
 from model.arrays import Array, Real
 
 LIMIT = 0.01
-"""Relative shift of omega_c above which the model is said not to hold: the accuracy of a usual
-flowmeter."""
+"""Relative shift of omega_c above which the model doesn't hold: a usual flowmeter's accuracy."""
 AT_A_WALL = 1.7009
 """Stokes' drag on a sphere that touches a plane wall, relative to that far from it (M. E. O'Neill,
 Chem. Eng. Sci. 23 (1968) 1293: at rest in a slow shear flow). A ball that touches two walls feels
@@ -45,13 +43,11 @@ class Rolling:
     Re: float
     """|w| r^2/nu_f of the spin."""
     friction: float
-    """Friction that it takes, divided by what floor and wall have; beyond 1 the ball can't roll
-    so."""
+    """Friction that it takes, divided by what there is; beyond 1 the ball can't roll so."""
 
 
 def torque_rate(spin: Real, p: Parameters, layer: bool = True) -> Real:
-    """The rate k in s-1 at which the fluid's torque brakes a spin of `spin` rad s-1; by Stokes
-    unless `layer`.
+    """Rate k, s-1, at which the fluid's torque brakes a spin, rad s-1; by Stokes unless `layer`.
 
     p.fluid_torque takes the place of both if it is given.
     """
@@ -63,8 +59,7 @@ def torque_rate(spin: Real, p: Parameters, layer: bool = True) -> Real:
 
 
 def rolling(p: Parameters, layer: bool = True) -> Rolling:
-    """The stationary RR at p.omega_0 with the fluid's torque on the spin; nan where nothing moves
-    (omega_0 or c = 0).
+    """The stationary RR at p.omega_0 with the fluid's torque; nan where omega_0 or c is 0.
 
     In RR the spin is (R omega_c/r, -R omega_c/r, 0) (4). It is steady if friction balances the
     torque, A_z = -j k m R omega_c and B_z = -j k m (R omega_c + r omega_0), and drag these, j k (2
@@ -99,8 +94,7 @@ def rolling(p: Parameters, layer: bool = True) -> Rolling:
 
 
 def model_error(p: Parameters) -> float:
-    """Relative error of the model for want of the fluid's torque and inertia; 0 if the fluid isn't
-    known.
+    """Relative error of the model, without the fluid's torque and inertia; 0 if it isn't known.
 
     The larger of what Stokes and the boundary layer say, or the largest shift by the fluid's
     inertia if that is more."""

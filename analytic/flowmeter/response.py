@@ -1,5 +1,4 @@
-"""How the reading follows a flow that changes: linear response of the stationary motions, and ramps
-past the fold.
+"""How the reading follows a flow that changes: linear response, and ramps past the fold.
 
 About a stationary motion x' = J x + b (omega_0 - p.omega_0), with J of `dynamics.jacobian` and b
 the derivative of the vector field by omega_0. In RR this is (23) itself, exact for any amplitude: a
@@ -27,8 +26,7 @@ _BRANCH_STEP = 1e-3
 
 
 def rolling_rate(p: Parameters) -> float:
-    """Rate c/(1+2j) in s-1 at which omega_c follows omega_0 in RR (23); `InputError` for another
-    law than Stokes'."""
+    """Rate c/(1+2j), s-1, of omega_c after omega_0 in RR (23); `InputError` unless Stokes' law."""
     if p.drag != STOKES:
         raise InputError(
             f"drag = {p.drag!r}: omega_c follows the flow at one rate with Stokes' drag only"
@@ -37,8 +35,7 @@ def rolling_rate(p: Parameters) -> float:
 
 
 def transfer(p: Parameters, case: Case, frequency: npt.ArrayLike) -> npt.NDArray[np.complex128]:
-    """omega_c divided by omega_0, complex, in small pulsations about p.omega_0 at frequencies in
-    Hz, same shape.
+    """Complex omega_c divided by omega_0 in small pulsations at frequencies in Hz, same shape.
 
     About the stable motion of the case; its modulus is the gain, its argument the phase lead
     (negative: a lag). Raises `InputError` if there is no such motion."""
@@ -50,8 +47,7 @@ def transfer(p: Parameters, case: Case, frequency: npt.ArrayLike) -> npt.NDArray
 
 
 def step_response(p: Parameters, case: Case, t: npt.ArrayLike) -> Array:
-    """Change of omega_c at times t >= 0 in s after a small jump of the flow, divided by the jump;
-    same shape.
+    """Change of omega_c at t >= 0 (s) after a small jump of the flow, divided by it; same shape.
 
     About the stable motion of the case at p.omega_0, as in `transfer`.
     """
@@ -78,8 +74,7 @@ def peak(p: Parameters, case: Case) -> tuple[float, float]:
 
 
 def ramp_coefficient(p: Parameters) -> float:
-    """K of the overshoot K rate^(2/3) with which a slow ramp passes the fold, rad s-1 for a rate of
-    1 rad s-2.
+    """K of the overshoot K rate^(2/3), rad s-1, of a slow ramp past the fold; rate in rad s-2.
 
     At the fold the slow coordinate obeys q' = a (omega_0 - omega_04) + b q^2, whose eigenvalue on
     the branch is 2 b q = -2 sqrt(-a b (omega_0 - omega_04)). On a ramp q is a ratio of Airy
@@ -97,8 +92,7 @@ def ramp_coefficient(p: Parameters) -> float:
 
 
 def _linearised(p: Parameters, case: Case) -> tuple[Array, Array, int]:
-    """J (d, d), b (d,) of x' = J x + b (omega_0 - mean) about the stable motion of a case, and the
-    row of omega_c."""
+    """J (d, d), b (d,) of x' = J x + b (omega_0 - mean) in a stable motion; the row of omega_c."""
     x = stationary.solution(p, case).x
     active = TRAITS[case].active
     rates = dynamics.rates(case, State(*x), p, p.omega_0 + 1j * dynamics.STEP)

@@ -1,2 +1,1 @@
-"""Forces and equations of motion: drag, Coulomb friction, the nine cases, and the contact problem
-of one instant."""
+"""Forces and equations of motion: drag, the nine cases, and the contact problem of one instant."""

@@ -52,8 +52,7 @@ EAGER, WHOLE = 5, 1e4
 PLAIN_SWEEPS = 6
 """Sweeps before the continuation takes over."""
 ATTEMPT = 100
-"""Sweeps after which the continuation starts again: from zero the first time, then from where it
-is."""
+"""Sweeps after which the continuation starts again: first from zero, then from where it is."""
 DAMPED = 0.5
 """Share of a sweep that is taken in all attempts but the first, before the continuation."""
 WARY, BOLD = 1.0, 1.3
@@ -61,8 +60,7 @@ WARY, BOLD = 1.0, 1.3
 even and in odd attempts: the first suits sweeps that oscillate, the second impulses that build up
 in the corner until one of them reaches the limit of friction."""
 SPAN, GROWTH, LONGEST_SPAN = 1.0, 8.0, 1e8
-"""First step of the continuation, in sweeps; factor by which steps grow; and the longest, which is
-one of Newton's."""
+"""First step of the continuation, in sweeps; how steps grow; the longest, one of Newton's."""
 SHORTER, CALMER, LEAST_GROWTH = 20.0, 0.7, 1.1
 """A setback divides the length by the first and raises the growth to the power of the second, down
 to the third."""
@@ -77,8 +75,7 @@ class Closed(NamedTuple):
     target: float = 0.0
     """Least normal velocity (or acceleration) afterwards."""
     s: float = 0.0
-    """Unit vector along which the contact slips (x, z at A; y, z at B) if that is known
-    beforehand."""
+    """Unit vector along which it slips (x, z at A; y, z at B) if that is known beforehand."""
     t: float = 0.0
     closed: bool = True
     """False for one that is open, and takes no part."""
@@ -119,8 +116,7 @@ class NotConvergedError(ArithmeticError):
 def solve(
     free: Velocities, A: Closed, B: Closed, p: Any, start: Forces, tolerance: float
 ) -> tuple[Velocities, Forces, bool]:
-    """Velocities and impulses that obey Coulomb's law at both contacts, and whether the sweeps
-    settled.
+    """Velocities and impulses that obey Coulomb's law at both contacts; whether sweeps settled.
 
     Parameters
     ----------
@@ -168,8 +164,7 @@ def impulses(A: Impulse, B: Impulse, m: float) -> Forces:
 
 
 def project(need: Impulse, friction: Friction) -> Impulse:
-    """The impulse nearest to the needed one that Coulomb's law allows: friction in its disk, or
-    against known slip."""
+    """The nearest impulse by Coulomb's law: friction in its disk, or against known slip."""
     n, s, t = need
     if n <= 0:
         return NO_IMPULSE
@@ -183,8 +178,7 @@ def project(need: Impulse, friction: Friction) -> Impulse:
 
 
 def _share_met(need: Impulse, friction: Friction) -> Impulse:
-    """Share of the needed friction that `project` grants: 1 sticking, 0 open, else less, with its
-    direction (s, t)."""
+    """Share of the need that `project` grants: 1 sticking, 0 open; and its direction (s, t)."""
     if need.n <= 0:
         return NO_IMPULSE
     if friction.s != 0 or friction.t != 0:
@@ -212,8 +206,7 @@ def _need(a: Impulse, other: Impulse, k: float) -> Impulse:
 def _sweep_rate(
     at_A: Impulse, at_B: Impulse, by: Impulse, A: Friction, B: Friction, k: float
 ) -> Impulse:
-    """How the impulse at B after a sweep changes if that before it changes in the direction
-    `by`."""
+    """How the impulse at B after a sweep changes if that before changes in the direction `by`."""
     by_A = _project_rate(at_A, A, _need(NO_IMPULSE, by, k))
     return _project_rate(at_B, B, _need(NO_IMPULSE, by_A, k))
 
@@ -229,8 +222,7 @@ def _dot(a: Impulse, b: Impulse) -> float:
 def _implicit_step(
     need_A: Impulse, need_B: Impulse, step: Impulse, span: float, A: Friction, B: Friction, k: float
 ) -> Impulse:
-    """An implicit Euler step of length `span` of dB/dt = f(B) - B, where a sweep f takes B on by
-    `step`."""
+    """An implicit Euler step of dB/dt = f(B) - B over `span`; a sweep f takes B on by `step`."""
     at_A, at_B = _share_met(need_A, A), _share_met(need_B, B)
     x = _sweep_rate(at_A, at_B, Impulse(1.0, 0.0, 0.0), A, B, k)
     y = _sweep_rate(at_A, at_B, Impulse(0.0, 1.0, 0.0), A, B, k)
@@ -247,8 +239,7 @@ def _implicit_step(
 
 
 def _contact_state(need: Impulse, given: Impulse) -> int:
-    """State of a contact from the impulse it needs and the one it gets: 0 open, 1 sticking, 2
-    sliding."""
+    """State of a contact by the impulses needed and given: 0 open, 1 sticking, 2 sliding."""
     if given.n == 0:
         return 0
     return 1 if given.s == need.s and given.t == need.t else 2
@@ -257,8 +248,7 @@ def _contact_state(need: Impulse, given: Impulse) -> int:
 def solve_pair(
     a: Impulse, b: Impulse, start: Impulse, A: Friction, B: Friction, j: float, enough: float
 ) -> tuple[Impulse, Impulse, float]:
-    """Impulses of two closed contacts that obey Coulomb's law, from a guess of that at B; how much
-    they still changed.
+    """Impulses of two closed contacts by Coulomb's law, from a guess at B; their last change.
 
     That is at most `enough` (m s-1) unless `MAX_SWEEPS` were not enough. Sweeps with Newton's
     method count from -`EAGER` up to 0, those after it from 0 on."""

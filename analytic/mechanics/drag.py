@@ -1,5 +1,4 @@
-"""The drag -m c(|w|) w of each law of `model.drag`, |w| the speed relative to the fluid, and fall
-under it alone.
+"""The drag -m c(|w|) w of each law of `model.drag`, w relative to the fluid; fall under it alone.
 
 With Re = 2 r |w|/nu_f every law is one formula, c(|w|) = max(linear + wake |w|^0.687, blunt |w|):
 Stokes' has the first term alone, the quadratic one the last. So c never decreases with |w|, and a
@@ -21,11 +20,9 @@ from model.arrays import Array, Real
 from model.drag import QUADRATIC, REYNOLDS, SCHILLER_NAUMANN, STOKES
 
 EXPONENT, WAKE, BLUNT = 0.687, 0.15, 0.44
-"""Schiller and Naumann's C_D = 24/Re (1 + WAKE Re^EXPONENT), and that of greater Reynolds
-numbers."""
+"""Schiller and Naumann's C_D = 24/Re (1 + WAKE Re^EXPONENT), and that of greater Re."""
 SPEED_STEPS = 8
-"""Steps of Newton's method from less than twice the root to round-off: 6, and 2 more for the corner
-of `DragLaw`."""
+"""Steps of Newton's method from less than twice the root: 6, and 2 for the corner of `DragLaw`."""
 FALL_STEPS = 100
 """Most steps of it to the end of a fall, far more than it takes."""
 
@@ -39,8 +36,7 @@ class DragLaw(NamedTuple):
 
 
 def law(p: Parameters) -> DragLaw:
-    """The law of a parameter set. Raises KeyError for a law of `model.drag` that has no formula
-    here."""
+    """The law of a parameter set; KeyError for a law of `model.drag` without a formula here."""
     per_speed = 2 * p.r / (p.nu_f or math.inf)
     laws = {
         STOKES: DragLaw(p.c, 0.0, 0.0),
@@ -59,27 +55,23 @@ def rate(speed: Real, law: DragLaw) -> Real:
 
 
 def coefficient(speed: Real, p: Parameters) -> Real:
-    """c(|w|) at a speed |w| >= 0 (m s-1) relative to the fluid, s-1: the drag on the ball is -m
-    c(|w|) w, N."""
+    """c(|w|), s-1, at a speed |w| >= 0 (m s-1) relative to the fluid: drag is -m c(|w|) w, N."""
     return p.c if p.drag == STOKES else rate(speed, law(p))
 
 
 def of_velocity(w_h: Real, w_y: Real, w_k: Real, p: Parameters) -> Real:
-    """c(|w|) of a velocity relative to the fluid, inward, upward and along the orbit, rho (omega_c
-    - omega_0); s-1."""
+    """c(|w|), s-1, of a velocity relative to the fluid: inward, upward, rho (omega_c - omega_0)."""
     return p.c if p.drag == STOKES else rate(speed(w_h, w_y, w_k), law(p))
 
 
 def speed(w_h: Real, w_y: Real, w_k: Real) -> Real:
-    """The speed |w| of a velocity relative to the fluid, its components as in `of_velocity`, m
-    s-1."""
+    """The speed |w| relative to the fluid, m s-1, from components as in `of_velocity`."""
     square = w_h * w_h + w_y * w_y + w_k * w_k
     return math.sqrt(square) if isinstance(square, float) else np.sqrt(square)
 
 
 def slope(speed: Real, p: Parameters) -> Real:
-    """d(c(|w|) |w|)/d|w|, s-1: how the drag per mass answers a change along w; across w it is
-    `coefficient`."""
+    """d(c(|w|) |w|)/d|w|, s-1: the answer to a change along w; across w it is `coefficient`."""
     if p.drag == STOKES:
         return p.c
     linear, wake, blunt = law(p)
@@ -90,8 +82,7 @@ def slope(speed: Real, p: Parameters) -> Real:
 
 
 def speed_of(acceleration: npt.ArrayLike, p: Parameters) -> Array:
-    """The speed |w| (m s-1) at which the drag per mass c(|w|) |w| is a given one >= 0 (m s-2); inf
-    where c = 0."""
+    """Speed |w| (m s-1) at which drag per mass, c(|w|) |w|, is as given (m s-2); inf for c = 0."""
     given, terms, powers = np.asarray(acceleration, dtype=float), law(p), (1.0, 1.0 + EXPONENT, 2.0)
     alone = [
         (given / term) ** (1 / power) for term, power in zip(terms, powers, strict=True) if term > 0
@@ -115,21 +106,18 @@ def reynolds(speed: Real, p: Parameters) -> Real:
 
 
 def reynolds_of(x: State, p: Parameters) -> float:
-    """Reynolds number of a ball in a state x in the flow p.omega_0; nan if the viscosity isn't
-    known."""
+    """Reynolds number of a ball in a state x in the flow p.omega_0; nan without viscosity."""
     return float(reynolds(speed(x.v_h, x.v_y, (p.R - x.h) * (x.omega_c - p.omega_0)), p))
 
 
 def covers(Re: float, law: str) -> bool:
-    """Whether a Reynolds number is within the range of a law; 0, at which there is no drag, always
-    is."""
+    """Whether a Reynolds number is within the range of a law; 0, without drag, always is."""
     low, high = REYNOLDS[law]
     return Re == 0 or low <= Re <= high
 
 
 def sinking_speed(*, nu_f: float, rho_f: float, rho_b: float, r: float, gravity: float) -> float:
-    """Terminal speed v in m/s of a sphere in a fluid at rest: weight less buoyancy is 6 pi rho_f
-    nu_f r v.
+    """Terminal speed v, m s-1, of a sphere: weight less buoyancy is 6 pi rho_f nu_f r v.
 
     nu_f is the kinematic viscosity of the fluid, m2 s-1; rho_f and rho_b are densities of fluid and
     sphere, kg m-3; r is the radius, m; gravity is in vacuum, m s-2.
@@ -176,8 +164,7 @@ def fall_time(y: float, v_y: float, p: Any) -> float:
 
 
 def ramp_lag(s: float) -> float:
-    """(s - 1 + exp(-s))/s^2, by its series where that cancels: how a ball with linear drag lags
-    behind a ramp."""
+    """(s - 1 + exp(-s))/s^2, by its series where that cancels: the lag of linear drag in a ramp."""
     if abs(s) < 1e-2:
         return 1 / 2 - s / 6 * (1 - s / 4 * (1 - s / 5 * (1 - s / 6 * (1 - s / 7))))
     return (s + math.expm1(-s)) / s**2

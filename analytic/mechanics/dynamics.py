@@ -27,8 +27,7 @@ from model.errors import check_type
 from model.kinematics import UNITS, VARIABLES
 
 STEP = 1e-100
-"""Complex step: its square vanishes beside any state, so that the derivative is exact to
-round-off."""
+"""Complex step: its square vanishes beside any state, so that derivatives are exact."""
 Direction = tuple[Real, Real]
 """Sine and cosine of a slip direction (8)."""
 
@@ -60,8 +59,7 @@ def vector_field(
 def contact_forces(
     case: Case, x: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None
 ) -> tuple[Array, Array]:
-    """Contact forces F_A, F_B on the ball in N, each (..., 3), as the case demands them: (16),
-    (17), (21), (29).
+    """Contact forces F_A, F_B on the ball, N, (..., 3), of a case: (16), (17), (21), (29).
 
     A negative normal force, or friction beyond Coulomb's, means that the case can't go on. In RR
     the forces are a one-parameter family; this is the member of least friction utilisation
@@ -88,8 +86,7 @@ def contact_forces(
 
 
 def check_state(case: Case, x: npt.ArrayLike, p: Parameters) -> State:
-    """Return states x (..., 6 or 8) as columns; `InputError` if one of them violates the case
-    (Tables 3 and 4).
+    """States x (..., 6 or 8) as columns; `InputError` if one violates the case (Tables 3 and 4).
 
     The constraints must hold exactly (v_h + r slip_z to round-off), a slipping contact must slip,
     and an open contact needs a gap of zero or more, less than R at the wall."""
@@ -128,8 +125,7 @@ def rates(case: Case, x: Sequence[Real], p: Parameters, omega_0: Real) -> State:
 def newton_euler(
     case: Case, x: Sequence[Real], f: Sequence[Real], p: Parameters, omega_0: Real
 ) -> State:
-    """Rates of the eight state variables under forces f by (20); what the case holds at zero is
-    exactly zero.
+    """Rates of the eight variables under forces f, (20); what the case holds at zero is zero.
 
     For h = 0 this is (21). Off the wall, with rho = R - h and the spin o of the ball in the
     co-rotating frame: m(v_h' + rho omega_c^2) = A_x + B_x - m c v_h, m(rho omega_c' - 2 v_h
@@ -189,8 +185,7 @@ def _drag_rate(x: Sequence[Real], p: Parameters, omega_0: Real) -> Real:
 
 
 def _rs(x: Sequence[Real], p: Parameters, omega_0: Real, slip_B: Direction) -> Forces:
-    """Forces of RS (24): w_z stays 0 without B_y, so that A_x alone keeps the spin axis turning
-    with the orbit."""
+    """Forces of RS (24): w_z stays 0 without B_y, so that A_x alone turns the spin axis."""
     (_, _, omega_c, *_), (sine, _) = x, slip_B
     u = p.m * p.R * omega_c**2
     B_x = (1 + p.j) * u
@@ -238,8 +233,7 @@ def _ns(x: Sequence[Real], p: Parameters, omega_0: Real, slip_B: Direction) -> F
 
 
 def _rn(x: Sequence[Real], p: Parameters, omega_0: Real) -> Forces:
-    """Forces of a ball that rolls on the floor away from the wall: drag alone drives the
-    friction."""
+    """Forces of a ball that rolls on the floor off the wall: drag alone drives the friction."""
     _, _, omega_c, _, _, _, h, v_h = x
     share = p.j * p.m * _drag_rate(x, p, omega_0) / (1 + p.j)
     return Forces(share * v_h, p.m * p.g, share * (p.R - h) * (omega_c - omega_0))
@@ -261,8 +255,7 @@ FORCES: dict[Case, Callable[..., Forces]] = {
     Case.SN: _sn,
     Case.NN: lambda x, p, omega_0: Forces(),
 }
-"""The forces of each case but RR, as `forces`, from x, p, omega_0 and the directions of its slips,
-A before B."""
+"""Forces of each case but RR from x, p, omega_0 and the directions of its slips, A before B."""
 
 _HELD = {
     case: [VARIABLES.index(name) for name in traits.constraints if name in VARIABLES]
@@ -272,8 +265,7 @@ _HELD = {
 
 
 def sliding_velocities(x: Sequence[Real], p: Parameters) -> tuple[Direction, Direction]:
-    """Sliding speeds in m s-1 at A and B along the directions of sine and cosine of alpha and beta:
-    (6), (8)."""
+    """Sliding speeds, m s-1, at A, B along sine and cosine of alpha, beta: (6), (8)."""
     _, v_y, _, w_x, w_y, w_z, _, v_h = x
     return (p.r * w_x, v_h + v_y + p.r * w_z), (p.r * w_y, p.r * w_z)
 

@@ -12,8 +12,7 @@ from model.arrays import Real
 
 
 class Velocities(NamedTuple):
-    """Velocities of the centre (m s-1) and spin (rad s-1) along the paper's axes i, j, k, or their
-    rates."""
+    """Velocities of the centre (m s-1) and spin (rad s-1) along i, j, k, or their rates."""
 
     v_h: Real
     v_y: Real
@@ -64,8 +63,7 @@ def slip_at_B(u: Velocities, p: Any) -> tuple[Real, Real]:
 
 
 def apply(u: Velocities, P: Forces, p: Any) -> Velocities:
-    """Velocities after impulses P; or with accelerations u, accelerations under forces P besides:
-    (20)."""
+    """Velocities after impulses P; or of accelerations u, those with forces P besides: (20)."""
     m, jmr = p.m, p.j * p.m * p.r
     (v_h, v_y, v_k, o_x, o_y, o_z), (A_x, A_y, A_z, B_x, B_y, B_z) = u, P
     v_h, v_y, v_k = v_h + (A_x + B_x) / m, v_y + (A_y + B_y) / m, v_k + (A_z + B_z) / m

@@ -1,5 +1,4 @@
-"""Contact forces of two-point rolling (RR): a one-parameter family, and whether any member is
-admissible.
+"""Contact forces of two-point rolling (RR): a one-parameter family; which are admissible.
 
 Rolling at A and B leaves one force free, say B_y: A_x = B_y - j u, A_y = G - B_y, B_x = (1+j) u -
 B_y, with u = m R omega_c^2, G = m g, and A_z = B_z = z given by (23). RR can go on only if some B_y
@@ -22,22 +21,19 @@ from model.arrays import Array
 
 @dataclass(frozen=True)
 class LeastUtilisation:
-    """The member of the family whose larger friction utilisation is the least; arrays of one
-    shape."""
+    """The member of the family with the least larger utilisation; arrays of one shape."""
 
     B_y: Array
     """Its free component, N; where the least is only approached as the forces grow without bound,
     since the ball can jam, the greatest that is admissible, and nan if none is."""
     utilisation: Array
-    """max(|friction at A|/(mu A_y), |friction at B|/(eta B_x)); RR can go on where it is <= 1 with
-    finite forces."""
+    """max(|friction at A|/(mu A_y), |friction at B|/(eta B_x)); RR lasts where <= 1, B_y finite."""
 
 
 def admissible_interval(
     omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None
 ) -> tuple[Array, Array]:
-    """Least and greatest admissible B_y in N; nan where there is none, -inf where the ball can jam
-    (mu, eta > 1)."""
+    """Least and greatest admissible B_y, N; nan for none, -inf if it can jam (mu, eta > 1)."""
     least, greatest = _interval(*_loads(omega_c, p, omega_0), p)
     exists = (least <= greatest) & (greatest > -np.inf) & (margin(omega_c, p, omega_0) >= 0)
     low, high = (np.where(exists, p.m * p.g * end, np.nan) for end in (least, greatest))
@@ -45,8 +41,7 @@ def admissible_interval(
 
 
 def margin(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None) -> Array:
-    """How far RR is from its end, in closed form: >= 0 exactly where both cones can hold,
-    continuous through 0.
+    """How far RR is from its end: >= 0 exactly where both cones can hold, continuous through 0.
 
     The smallest of three lengths in units of m g: the slack of either cone alone, and the overlap
     of the two intervals of B_y."""
@@ -89,8 +84,7 @@ def _last_share(u: Array, z: Array, p: Parameters) -> Array:
 def least_utilisation(
     omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None
 ) -> LeastUtilisation:
-    """The forces of RR whose larger friction utilisation, of floor or wall, is the least over the
-    family.
+    """The forces of RR whose larger friction utilisation is the least over the family.
 
     Each utilisation falls and then rises along B_y, so that the least maximum is at the lowest
     point of one of them or at their only crossing in between. The search runs in q = 1/(1 + A_y/G),
@@ -151,8 +145,7 @@ def _interval(u: Array, z: Array, p: Parameters) -> tuple[Array, Array]:
 
 
 def _normal_forces(d: Array, z: Array, friction: float) -> tuple[Array, Array]:
-    """Roots s of (d - s)^2 + z^2 = friction^2 s^2 that bound the admissible normal forces of one
-    contact.
+    """Roots s of (d - s)^2 + z^2 = friction^2 s^2, which bound the normal forces of a contact.
 
     Where no s is admissible the discriminant is taken as 0, or both ends are inf: there `margin` is
     negative."""
@@ -164,8 +157,7 @@ def _normal_forces(d: Array, z: Array, friction: float) -> tuple[Array, Array]:
 
 
 def _least_utilisation_alone(d: Array, z: Array, friction: float) -> Array:
-    """Least utilisation of friction that one contact has over the family of forces, whatever the
-    other's."""
+    """Least utilisation of one contact's friction over the family, whatever the other's."""
     hyp = np.hypot(d, z)
     return _ratio(
         np.where(d > 0, _ratio(z, hyp), np.where(hyp > 0, 1.0, 0.0)), np.asarray(friction)

@@ -15,8 +15,7 @@ _MOST = 200
 
 
 def sign_change(f: Callable[[Array], Real], start: npt.ArrayLike, end: npt.ArrayLike) -> Array:
-    """Where f changes sign between start and end, element by element of arrays of any shape, to the
-    last digit.
+    """Where f changes sign between start and end, arrays of any shape, to the last digit.
 
     nan where it has one sign at both. By inverse quadratic interpolation where that can be trusted,
     else by halving (Chandrupatla, Adv. Eng. Software 28 (1997) 145); the root finders of scipy take

@@ -1,2 +1,1 @@
-"""Motions that are not stationary: periodic orbits, their branches, and the attractors that balls
-come to."""
+"""Motions that are not stationary: periodic orbits, their branches, and attractors."""

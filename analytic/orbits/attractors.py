@@ -35,13 +35,11 @@ WINDOW, WINDOW_SAMPLES = 100.0, 4000
 LASTING = 60.0
 """How long a run is followed, in units of 1/c."""
 STATIONARY_RANGE = 1e-3
-"""Range of the variables over a window, in natural units, below which a motion that still shrinks
-is stationary."""
+"""Range over a window, in natural units, below which a motion that still shrinks is stationary."""
 NEAR = 1e-2
 """Distance in natural units up to which it is that of a stationary solution."""
 ALIKE = 0.05
-"""Distance divided by the range of the motion up to which states, means and extremes are the
-same."""
+"""Distance relative to the motion's range up to which states, means and extremes are the same."""
 GROWING = 400.0
 """Duration over which the Lyapunov exponent is taken, in units of sqrt(R/g)."""
 APART = 1e-6
@@ -113,8 +111,7 @@ class Attractor:
 
     @property
     def run(self) -> Trajectory:
-        """The motion on it: a period by theory where there is an orbit, else the last window of a
-        run."""
+        """The motion on it: a period by theory if there is an orbit, else a run's last window."""
         return self.limit.orbit.cycle if self.limit.orbit else self.limit.last
 
 
@@ -232,8 +229,7 @@ def _windows_agree(a: Trajectory, b: Trajectory) -> bool:
 def _nearest_solution(
     last: Trajectory, solutions: Sequence[StationarySolution]
 ) -> StationarySolution | None:
-    """The stationary solution nearest to the last state, free variables aside; of two in one state
-    that of its case."""
+    """The solution nearest to the last state, free variables aside; of two that of its case."""
     x, case = last.x[-1], last.cases[-1]
     size = state_units(last.header.parameters)
 
@@ -246,8 +242,7 @@ def _nearest_solution(
 
 
 def periodic_limit(last: Trajectory) -> LimitSet | None:
-    """The periodic motion that a window of a run shows, with the stable orbit that theory has near
-    it.
+    """The periodic motion in a window of a run, with the stable orbit that theory has near it.
 
     None if it doesn't close. Candidates for the period are the first three good minima of the
     distance between the last quarter of the window and what was a lag of up to half the window
@@ -274,8 +269,7 @@ def periodic_limit(last: Trajectory) -> LimitSet | None:
 
 
 def _highest_state(last: Trajectory) -> tuple[Array, Case]:
-    """Where in a window the ball is highest: the state, with exact zeros where the case has them,
-    and the case."""
+    """The highest state of a window, with exact zeros where its case has them, and the case."""
     k = int(np.argmax(last.y))
     case = Case(last.case[k])
     return np.where([name in TRAITS[case].constraints for name in VARIABLES], 0.0, last.x[k]), case
@@ -284,8 +278,7 @@ def _highest_state(last: Trajectory) -> tuple[Array, Case]:
 def lyapunov(
     p: Parameters, x: npt.ArrayLike, case: Case, duration: float, renewed: float, run: Runs
 ) -> tuple[float, float]:
-    """Largest Lyapunov exponent of the motion from x, in a case, over a duration, and its standard
-    error, s-1.
+    """Largest Lyapunov exponent of the motion from x, in a case, and its standard error, s-1.
 
     A second motion starts beside the first, a distance `APART` away in natural units, and is
     brought back to that distance every `renewed` seconds, as soon as both are in one case; the mean

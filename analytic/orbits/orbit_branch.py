@@ -1,5 +1,4 @@
-"""Branches of periodic motions: an orbit followed in one parameter to where it is born and where it
-dies.
+"""Branches of periodic motions: orbits followed in one parameter from birth to death.
 
 The branch is followed by its length (in natural units of the state, and the logarithm of the
 parameter), so that it may turn back: a step along the tangent, then Newton's method across it.
@@ -33,20 +32,17 @@ from model.arrays import Array
 from model.parameters import check_names, check_number
 
 FIRST_STEP, LEAST_STEP, LONGEST_STEP = 0.2, 1e-5, 0.5
-"""Steps along the branch, in natural units: the first, those at which it is given up, and the
-longest."""
+"""Steps along the branch, in natural units: the first, the least, and the longest."""
 GRAZING = 0.01
 """Longest step in which the number of landings may change: other branches, as of balls that ride
 the wall, are near."""
 EASY = 5
 """Steps of Newton's method up to which the next step along the branch is longer."""
 SHARP = 1e-6
-"""How sharply a change of stability is located along the branch; a change of the sequence of cases
-by `HALVINGS`."""
+"""How sharply a change of stability is located along the branch; of cases by `HALVINGS`."""
 HALVINGS = 10
 SMALL = 0.05
-"""Extent divided by the largest of the branch, below which the branch is extrapolated to extent
-zero."""
+"""Extent relative to the branch's largest below which the branch is extrapolated to zero."""
 
 
 class Bifurcation(StrEnum):
@@ -65,8 +61,7 @@ class Bifurcation(StrEnum):
     HOPF = "Hopf"
     """It shrinks to a stationary motion within one case."""
     BIRTH = "nonsmooth birth"
-    """It shrinks to a stationary motion at which cases meet: its extent falls linearly, not like a
-    root."""
+    """It shrinks to a stationary motion where cases meet: linearly, not like a root."""
     LOST = "lost"
     """It isn't followed any further, for a reason that is given."""
     RANGE = "end of the range"
@@ -110,8 +105,7 @@ class OrbitBranch:
 
 
 def follow(start: Orbit, name: str, low: float, high: float, most: int = 100) -> OrbitBranch:
-    """Follow an orbit both ways in a parameter until it leaves [low, high], ends, or `most` orbits
-    are known each way.
+    """Follow an orbit both ways in a parameter to [low, high], its end, or `most` orbits each way.
 
     Raises `InputError` if there is no such parameter, or the orbit isn't within the range.
     """
@@ -137,8 +131,7 @@ def follow(start: Orbit, name: str, low: float, high: float, most: int = 100) ->
 def _one_way(
     start: Orbit, name: str, span: tuple[float, float], sign: float, most: int
 ) -> Iterator[Orbit | Place]:
-    """Follow the branch from an orbit towards larger (sign 1) or smaller values: orbits and places,
-    to its end."""
+    """Orbits and places along the branch towards larger (sign 1) or smaller values, to its end."""
     here, step, before = start, FIRST_STEP, [start]
     along = np.append(np.zeros(len(start.loop.free)), sign)
     try:
@@ -185,8 +178,7 @@ def _one_way(
 
 
 def _at_end_of_range(inside: Orbit, outside: Orbit, name: str, span: tuple[float, float]) -> Orbit:
-    """The orbit where the branch leaves the range, between the last within it and the first
-    outside."""
+    """The orbit where the branch leaves the range, between one within and one outside."""
     start, end = inside.loop.value(name), outside.loop.value(name)
     value = min(max(end, span[0]), span[1])
     share = (value - start) / (end - start)
@@ -196,8 +188,7 @@ def _at_end_of_range(inside: Orbit, outside: Orbit, name: str, span: tuple[float
 
 
 def _next_orbit(here: Orbit, by: Array, name: str, matrix: Array) -> Orbit:
-    """The next orbit on the branch, a step `by` away; `NoOrbitError` also if it is one of another
-    branch."""
+    """The next orbit, a step `by` away; `NoOrbitError` also if it is of another branch."""
     orbit = closed_orbit(here.loop.moved(by, name), name, matrix)
     if _on_other_branch(here, by, orbit.changes):
         raise NoOrbitError("the nearest orbit is one of another branch")
@@ -254,8 +245,7 @@ def _rotated_to_least(changes: Changes) -> Changes:
 
 
 def _on_other_branch(here: Orbit, by: Array, changes: Changes) -> bool:
-    """Whether a long step from an orbit led to one with another number of landings, so to another
-    branch."""
+    """Whether a long step led to another number of landings, so to another branch."""
     return bool(np.linalg.norm(by) > GRAZING) and sum(landings(changes)) != sum(
         landings(here.changes)
     )
@@ -266,5 +256,4 @@ _TESTS: dict[Bifurcation, Callable[[npt.NDArray[np.complex128]], float]] = {
     Bifurcation.DOUBLING: lambda m: -float(np.prod(1 + m[np.isreal(m)].real)),
     Bifurcation.TORUS: lambda m: float(np.abs(m[np.imag(m) != 0]).max(initial=0.0)) - 1,
 }
-"""Functions of the multipliers: positive if an odd number is real and beyond 1 (-1), or a pair
-outside the circle."""
+"""Positive if an odd number of multipliers is real and beyond 1 (-1), or a pair off the circle."""

@@ -1,5 +1,4 @@
-"""Periodic motions: orbits that close, by Newton's method on the return map, and how disturbances
-of them grow.
+"""Periodic motions: orbits closed by Newton's method on the return map, and their stability.
 
 The return map leads from a plane through a point of the orbit, across the motion there, back to it:
 through every event and impact in between, by the event-driven simulation. The point lies within one
@@ -38,8 +37,7 @@ CLOSED = 1e-10
 ITERATIONS = 8
 """Steps of Newton's method after which an orbit is given up."""
 FAST = 10.0
-"""Factor by which a step must reduce the defect for the derivatives of a neighbour to be used once
-more."""
+"""Factor by which a step reduces the defect if a neighbour's derivatives are to be used again."""
 RESTITUTION = "restitution"
 """What an orbit may be followed in beside parameters."""
 ORBIT_SAMPLES = 4000
@@ -63,8 +61,7 @@ class NoOrbitError(ArithmeticError):
 
 @dataclass(frozen=True)
 class Loop:
-    """A state within a case and the section through it: the plane on which one of its active
-    variables has its value.
+    """A state within a case and the section through it, on which one active variable has its value.
 
     The other active variables, in natural units, are the d - 1 coordinates of the section.
     """
@@ -84,8 +81,7 @@ class Loop:
 
     @classmethod
     def of(cls, p: Parameters, x: npt.ArrayLike, period: float, restitution: float = 0.0) -> Loop:
-        """A good section of a motion that passes a state (6 or 8 entries) and has about this
-        period, s.
+        """A good section of a motion through a state (6 or 8 entries), of about this period, s.
 
         Of a ball that hops the top of its highest hop, v_y = 0. On the floor, within the middle
         half of the longest stretch in one case other than RR, where the case's fastest variable is
@@ -126,13 +122,11 @@ class Loop:
         return [k for k in active_variables(self.case) if k != self.fixed]
 
     def coordinates(self, x: Array) -> Array:
-        """Coordinates in the section (..., d - 1), in natural units, of states (..., 8) or
-        differences of states."""
+        """Coordinates (..., d - 1), in natural units, of states (..., 8) or differences of them."""
         return np.asarray(x[..., self.free] / state_units(self.p)[self.free])
 
     def moved(self, by: Array, varied: str | None = None) -> Loop:
-        """The loop moved by coordinates (d - 1,) and, if a parameter is `varied`, by its logarithm,
-        (d,).
+        """The loop moved by coordinates (d - 1,), and by the logarithm of what is `varied`, (d,).
 
         Raises `NoOrbitError` where that leads out of the range of the parameter.
         """
@@ -231,8 +225,7 @@ class Orbit:
 
     @cached_property
     def multipliers(self) -> npt.NDArray[np.complex128]:
-        """Floquet multipliers (d - 1,), largest modulus first, d the dimension of the case of
-        `loop`."""
+        """Floquet multipliers (d - 1,), d the dimension of the case, largest modulus first."""
         values = np.linalg.eigvals(self.derivative).astype(complex)
         return np.asarray(values[np.argsort(-np.abs(values), kind="stable")])
 
@@ -260,8 +253,7 @@ class Orbit:
 
 
 def refine(p: Parameters, x: npt.ArrayLike, period: float, restitution: float = 0.0) -> Orbit:
-    """The closed orbit near a state x (6 or 8 entries) with about this period, s, by Newton's
-    method.
+    """The closed orbit near a state x (6 or 8 entries), of about this period, s, by Newton.
 
     `restitution` as in `Settings`. The guess may be off by some percent of the orbit.
 
@@ -272,8 +264,7 @@ def refine(p: Parameters, x: npt.ArrayLike, period: float, restitution: float = 
 
 
 def closed_orbit(loop: Loop, varied: str | None = None, neighbour: Array | None = None) -> Orbit:
-    """The closed orbit near a loop, by Newton's method; a parameter that is `varied` is one more
-    unknown.
+    """The closed orbit near a loop, by Newton's method; a `varied` parameter is one more unknown.
 
     There is then one unknown more than equations: the place on a branch. Newton's step is the
     shortest one (Moore and Penrose), across the branch. The `defect_jacobian` of a neighbour, if
@@ -283,8 +274,7 @@ def closed_orbit(loop: Loop, varied: str | None = None, neighbour: Array | None 
 
 
 def close_loop(loop: Loop, varied: str | None, neighbour: Array | None) -> tuple[Loop, Return, int]:
-    """The closed loop near a loop, its return, and how many steps Newton's method took; arguments
-    of `closed_orbit`."""
+    """The closed loop near a loop, its return, and Newton's steps; arguments of `closed_orbit`."""
     before = math.inf
     for step in range(ITERATIONS + 1):
         back = loop.back()
@@ -307,8 +297,7 @@ def close_loop(loop: Loop, varied: str | None, neighbour: Array | None) -> tuple
 
 
 def defect_jacobian(loop: Loop, derivative: Array, varied: str | None) -> Array:
-    """Derivative (d - 1, d - 1) of the gap by which a loop isn't closed; one more column if a
-    parameter is varied."""
+    """Derivative (d - 1, d - 1) of a loop's defect; one more column if a parameter is varied."""
     by_state = derivative - np.eye(len(derivative))
     if not varied:
         return by_state

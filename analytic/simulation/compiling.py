@@ -23,8 +23,7 @@ called = set[Callable[..., Any]]()
 
 
 def compiled(function: F) -> F:
-    """Compile a function at its first call, for threads to run it at once, with the functions of
-    `analytic` that it calls.
+    """Compile a function at its first call, for threads, with what it calls of `analytic`.
 
     Numba keeps what it compiles on disk by name and compiles it again when its own file has
     changed, but not when that of a function has which it calls: the name contains the digest of
@@ -66,8 +65,7 @@ def compiled(function: F) -> F:
 
 
 def _called(function: Callable[..., Any]) -> set[Callable[..., Any]]:
-    """The functions of `analytic` that a function calls, by their names or as those of a module;
-    and so on."""
+    """The functions of `analytic` that a function calls, by name or through a module; and so on."""
     found, todo = set[Callable[..., Any]](), [function]
     while todo:
         code, known = (one := todo.pop()).__code__, one.__globals__

@@ -1,5 +1,4 @@
-"""Coordinates in which the motion of each case is regular, and what can end it; `equations` has
-their rates.
+"""Coordinates in which each case is regular, and what can end it; rates are in `equations`.
 
 At the wall these are the active variables of the case (Table 4), except that each slip is given by
 its speed q and its direction (alpha at A, beta at B): friction depends on the direction alone, so
@@ -66,11 +65,9 @@ ENDS = (
     (A_LANDS, B_STICKS, NONE, NONE),
     (B_LANDS, A_LANDS, NONE, NONE),
 )
-"""What can end each case, by its number; at the wall what the coordinates show first, then what
-forces do."""
+"""What can end each case, by number; at the wall what coordinates show, then what forces do."""
 TURNING = ((0, 0), (0, 0), (0, 0), (0, 0), (2, 6), (4, 6), (0, 0), (5, 7), (0, 0))
-"""Of each case where among the coordinates slips begin and end that turn; each is followed by its
-direction."""
+"""Of each case where among the coordinates slips that turn begin and end, directions between."""
 
 
 def count_guards(k: System) -> int:
@@ -85,8 +82,7 @@ def count_guards(k: System) -> int:
 
 
 def begin(case: int, at: HybridState, k: System, z: Any, scale: Any) -> tuple[System, int]:
-    """Begin a case: write coordinates z and their natural sizes; return its constants
-    and their number."""
+    """Begin a case: write coordinates z and their sizes; return its constants and their number."""
     if case % 3 == AWAY:
         return _begin_off_wall(case, at, k, z, scale)
     return _begin_on_wall(case, at, k, z, scale)
@@ -144,8 +140,7 @@ def _begin_off_wall(
 
 
 def hybrid_state(t: Any, z: Any, at: HybridState, k: System) -> HybridState:
-    """The state with azimuth and work at a time t, from coordinates z of a case that began at
-    `at`.
+    """The state with azimuth and work at a time t, from coordinates z of a case begun at `at`.
 
     An azimuth off the wall is given up to whole turns.
     """
@@ -204,8 +199,7 @@ def least_slip(z: Any, scale: Any, case: int) -> float:
 
 
 def rebound_time(at: HybridState, z: Any, k: System, rate: Any) -> float:
-    """How long a rebound that begins at a moment will last by the accelerations then, s; inf if
-    none begins."""
+    """How long a rebound that begins here lasts by the accelerations now, s; inf if none does."""
     x, lasts = at.x, math.inf
     equations.rates(at.time, z, k, rate)
     if x.y == 0 < x.v_y and k.fall.landing == math.inf:
@@ -218,8 +212,7 @@ def rebound_time(at: HybridState, z: Any, k: System, rate: Any) -> float:
 
 
 def arm_guards(values: Any, k: System, arm: Any, level: Any) -> bool:
-    """Set the values above which guards are armed, and those at which they fire; whether a gap is
-    zero at first.
+    """Set values above which guards are armed, and at which they fire; whether a gap begins at 0.
 
     A guard that starts at zero, where round-off mustn't end the case, has to rise above the
     absolute tolerance first, or to fall below -`rtol`; a gap is armed by any height."""

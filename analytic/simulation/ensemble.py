@@ -125,8 +125,7 @@ def simulate_many(
 
 
 def random_starts(p: Parameters, count: int, seed: int = 0) -> Array:
-    """States (count, 8): at the wall, half of them on the floor, half up to R above it with speeds
-    up to sqrt(g R).
+    """States (count, 8) at the wall, half on the floor, half up to R above it, speeds to sqrt(g R).
 
     omega_c is up to twice omega_0 either way, slips up to what rolling at twice omega_0 is; all
     evenly spread."""
@@ -143,8 +142,7 @@ def random_starts(p: Parameters, count: int, seed: int = 0) -> Array:
 
 
 def interval(hits: int, of: int) -> tuple[float, float]:
-    """Confidence interval of 95 % of a share (Clopper-Pearson); all of [0, 1] if nothing was
-    tried."""
+    """95 % confidence interval of a share (Clopper-Pearson); [0, 1] if nothing was tried."""
     from scipy.stats import binomtest  # slow to import
 
     if of == 0:

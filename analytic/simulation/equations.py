@@ -20,8 +20,7 @@ RR, RS, RN, SR, SS, SN, NR, NS, NN = (int(case) for case in Case)
 A_STICKS, B_STICKS, A_SLIPS, B_SLIPS, A_LIFTS, B_OPENS, A_LANDS, B_LANDS, RR_ENDS = range(9)
 """What ends a case."""
 ROLLS, SLIPS, AWAY = range(3)
-"""Contacts: that with the floor is a case's number divided by three, that with the wall the
-remainder."""
+"""Contacts: with the floor a case's number divided by three, with the wall the remainder."""
 FINER = 1e3
 """Relative tolerance of an integrator divided by the absolute one in natural units."""
 LOCAL = 0.25
@@ -33,8 +32,7 @@ STIFF_STEPS = 300
 """Steps with a small slip after which a stiff method takes over; a slip that dies out takes
 fewer."""
 STABILITY, FEASIBILITY = range(2)
-"""What `leave_rolling` of `Settings` asks of RR: that slip dies out, or only that forces hold
-it."""
+"""What `Settings.leave_rolling` asks of RR: that slip dies out, or only that forces hold it."""
 
 
 class Line(NamedTuple):
@@ -256,15 +254,13 @@ def loads(omega_c: float, t: float, k: System) -> tuple[float, float]:
 
 
 def last_share(u: float, z: float, k: System) -> float:
-    """B_y in units of the weight at which RR ends, from its loads, as
-    `rolling_forces._last_share`."""
+    """B_y in units of m g at which RR ends, from its loads, as `rolling_forces._last_share`."""
     at_B = (1 + k.j) * u
     return min(max(at_B - _normal_forces(at_B, z, k.eta)[0], 0.0), k.j * u)
 
 
 def slip_margin(u: float, z: float, k: System) -> float:
-    """How far RR is from a slip that lasts, in units of the weight, from its loads, as
-    `rolling_forces.slip_margin`."""
+    """How far RR is from lasting slip, in units of m g, as `rolling_forces.slip_margin`."""
     share = last_share(u, z, k)
     return min(
         k.eta * (1 + k.j) * u - z, k.mu * (1 - share) - math.sqrt((k.j * u - share) ** 2 + z * z)
@@ -272,8 +268,7 @@ def slip_margin(u: float, z: float, k: System) -> float:
 
 
 def rolls_on(omega_c: float, t: float, k: System) -> float:
-    """How far RR is from where it is left, >= 0 while it lasts: `slip_margin`, or
-    `rolling_forces.margin`."""
+    """How far RR is from its end, >= 0 in it: `slip_margin`, or `rolling_forces.margin`."""
     u, z = loads(omega_c, t, k)
     if k.leaves == STABILITY:
         return slip_margin(u, z, k)
@@ -295,8 +290,7 @@ def _normal_forces(d: float, z: float, friction: float) -> tuple[float, float]:
 
 
 def _horizontal_drag(t: float, z: Any, rise: float, k: System) -> tuple[complex, complex, float]:
-    """Off the wall: complex horizontal velocity, that relative to the fluid, m s-1, and the drag
-    rate c(|w|), s-1."""
+    """Complex horizontal velocity, the same relative to the fluid, m s-1, and c(|w|), s-1."""
     V = complex(z[2], z[3])
     lag = V - 1j * fluid(t, k) * complex(z[0], z[1])
     return V, lag, drag_rate(lag.real, rise, lag.imag, k)
@@ -342,8 +336,7 @@ def _guards_away(t: float, z: Any, k: System, out: Any) -> None:
 
 
 def smooth_rates(u: Velocities, h: float, t: float, k: System) -> Velocities:
-    """Rates of u by gravity, drag and the turning of the axes: (20) with (9), no contact; h is the
-    gap at B."""
+    """Rates of u by gravity, drag, turning axes: (20) with (9), no contact; h is the gap at B."""
     turn, w_k = u.v_k / (k.R - h), u.v_k - fluid(t, k) * (k.R - h)
     c = drag_rate(u.v_h, u.v_y, w_k, k)
     return Velocities(

@@ -93,8 +93,7 @@ def follow(
 
 
 def _with_nearest_azimuth(at: HybridState, k: System, near: float) -> HybridState:
-    """The same hybrid state; of the azimuths that it may have off the wall that which is nearest
-    to another."""
+    """The state with that of its azimuths, off the wall up to whole turns, which is nearest."""
     if k.case % 3 != AWAY:
         return at
     theta = at.theta - 2 * math.pi * math.floor((at.theta - near) / (2 * math.pi) + 0.5)
@@ -102,8 +101,7 @@ def _with_nearest_azimuth(at: HybridState, k: System, near: float) -> HybridStat
 
 
 def _keep_samples(of: Stretch, at: HybridState, taken: int, run: Rows) -> float:
-    """Store samples up to number `taken` of a stretch that began at `at`; return the azimuth at the
-    last, or `at`'s."""
+    """Store samples up to number `taken` of a stretch begun at `at`; return the last azimuth."""
     near = at.theta
     for row in range(run.taken[0], taken):
         m = coordinates.hybrid_state(run.times[row], of.samples[row, : len(of.z)], at, of.k)
@@ -177,8 +175,7 @@ def run_through_flow(
 
 @lru_cache
 def prepare(p: Parameters, flow: Flow, settings: Settings, t_end: float) -> tuple[System, Array]:
-    """What runs of one ball in one flow share: the system, and pieces of the flow as rows of an
-    array."""
+    """What runs of one ball in one flow share: the system, and pieces of the flow as rows."""
     rows, least = [], _LEAST_JUMP * np.abs(flow.value).max()
     for start, end in pairwise([0.0, *flow.knots(t_end).tolist(), t_end]):
         jump = abs(float(flow.line(start) - flow.line(np.nextafter(start, -1.0))))

@@ -36,15 +36,13 @@ class StalledError(ArithmeticError):
 def first_pace(
     start: float, z: Array, scale: Array, case: int, opens: bool, first_step: float
 ) -> Pace:
-    """How steps begin in a stretch (a `Pace`); if a contact `opens`, a straight line is tried at
-    once."""
+    """How steps begin in a stretch; if a contact `opens`, a straight line is tried at once."""
     small = coordinates.least_slip(z, scale, case) < ONSET_SLIP
     return start, 0.0, 0.0 if small else first_step, small, 1 if opens else 0
 
 
 def finish_straight(t: float, of: Stretch, taken: int) -> int:
-    """Fill in the rest of a stretch if a straight line solves its equations and no guard fires:
-    samples taken, else -1.
+    """Fill in the rest of a stretch if a straight line solves it: samples taken, else -1.
 
     What moves by less than the tolerance is taken to rest.
     """

@@ -33,8 +33,7 @@ class HybridState(NamedTuple):
     theta: float
     x: State
     alpha: float = math.nan
-    """Direction of slip at A (8), rad, where it slips; at the very onset the state doesn't
-    determine it."""
+    """Direction of slip at A (8), rad; at the very onset the state doesn't determine it."""
     beta: float = math.nan
     """Direction of slip at B (8), rad."""
     work: float = 0.0
@@ -42,8 +41,7 @@ class HybridState(NamedTuple):
 
 
 def line_of(flow: Flow, start: float) -> Line:
-    """The linear piece of a flow, without its waves, that holds from the time `start`: a knot of
-    the flow, or 0."""
+    """The linear piece of a flow, without waves, that holds from `start`, s: a knot, or 0."""
     k = int(np.searchsorted(flow.start, start, side="right")) - 1
     if k < 0:
         return Line(float(start), float(flow.value[0]), 0.0)
@@ -51,8 +49,7 @@ def line_of(flow: Flow, start: float) -> Line:
 
 
 def of_ball(p: Parameters, flow: Flow, settings: Settings) -> System:
-    """The constants of a ball's motion as plain numbers, with the flow at first; `in_case` sets the
-    case."""
+    """A ball's constants as plain numbers, with the flow at first; `in_case` sets the case."""
     ball = p.m, p.r, p.R, p.j, p.mu, p.eta, p.g, p.c
     rules = {"slip-stability": equations.STABILITY, "infeasible": equations.FEASIBILITY}
     asked = float(settings.rtol), float(settings.restitution), rules[settings.leave_rolling]
@@ -81,8 +78,7 @@ class Rows(NamedTuple):
     taken: npt.NDArray[np.int64]
     """How many samples are kept, and how many events, shape (2,)."""
     reached: Array
-    """How far the run is, and the sample at which it is stopped if nothing more lands, shape (2,),
-    s."""
+    """How far the run is, and when it is stopped if nothing more lands, shape (2,), s."""
     quiet: float
     """For how long nothing must land for the run to be stopped, s."""
     over: npt.NDArray[np.bool_]
@@ -127,8 +123,7 @@ def count_landings(time: float, count: int, run: Rows) -> None:
 
 
 def quiet_from(landed: float, run: Rows) -> float:
-    """Time of the first sample at which nothing has landed for `quiet` seconds, if nothing does
-    from now on; or inf."""
+    """When nothing has landed for `quiet` seconds, if nothing lands from now on, s; or inf."""
     row = np.searchsorted(run.times, landed + run.quiet, side="right")
     return float(run.times[row]) if row < len(run.times) else math.inf
 

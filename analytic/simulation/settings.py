@@ -19,8 +19,7 @@ MAX_SAMPLES = 5e7
 LANDED = 1e-3
 """Speed relative to sqrt(g R) from which a landing counts: less is settling, or round-off."""
 HUGE, MAX_RADIANS = 1e3, 1e5
-"""Speed of a flow in units of sqrt(g/R), beyond which so many radians of it are simulated at
-most."""
+"""Speed of a flow, in units of sqrt(g/R), beyond which at most so many radians are simulated."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,8 +50,7 @@ class Settings:
     forces within both Coulomb cones hold it. On the stationary orbit both are the same for mu <= 1;
     on rougher floors, and off it, the second is later."""
     initial_impact: bool = False
-    """Let a ball that starts with a speed into a closed contact collide at once, instead of
-    refusing it."""
+    """Let a ball that starts with a speed into a contact collide at once; else it is refused."""
 
     def __post_init__(self) -> None:
         check_choice("method", self.method, ("event", "time-stepping"))

@@ -97,8 +97,7 @@ def simulator(settings: Settings) -> ModuleType:
 
 
 def slip_perturbation(p: Parameters, slip: float, beta: float, t_end: float) -> Trajectory:
-    """The stationary orbit of NR, pushed into NS by a slip of `slip` rad/s along beta: Figs. 4 and
-    5.
+    """The stationary NR, pushed into NS by a slip of `slip` rad/s along beta: Figs. 4 and 5.
 
     For omega_0 > sqrt(g/(eta R)) (61) slip dies out and the ball returns to NR (Fig. 4), else it
     grows (Fig. 5)."""
@@ -109,8 +108,7 @@ def slip_perturbation(p: Parameters, slip: float, beta: float, t_end: float) -> 
 
 
 def unloading(p: Parameters, hold: float) -> Trajectory:
-    """omega_0 lowered in steps through omega_02 with the ball in NR: the black dot of
-    Fig. 13 (eta > j).
+    """omega_0 lowered in steps through omega_02 in NR: the black dot of Fig. 13 (eta > j).
 
     NR is left for NS, the ball falls, hits the floor, and ends in RR: the transients and impacts of
     section 5.3."""

@@ -31,8 +31,7 @@ STAGES, ALL = len(B), len(B) + 1 + len(C_MORE)
 GROWN_SLIP = 1e-4
 """Slip from which on steps that are short cost less than stiff ones."""
 FINEST, FINEST_STIFF = 1e-13, 1e-11
-"""Least relative tolerances: what round-off leaves of explicit steps, and of those of a small
-slip."""
+"""Least relative tolerances: what round-off leaves of explicit steps, and of a small slip."""
 SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
 """Of the length of a step: below what its error allows; and by how much it may change."""
 LOOKS_A_STEP = 4
@@ -41,8 +40,7 @@ INSIDE, CLEAR = 8, 2.0
 """The stage, .65 of the step on, at which guards are looked at, too; and by how many times what
 they vary by they have to be positive for a step not to be looked into."""
 DYING = 1e-7
-"""Slip in natural units that goes straight to zero: what is left of it takes no time in which its
-rate would change."""
+"""Slip in natural units below which it goes straight to zero, too soon for its rate to change."""
 ROOT_STEPS = 200
 COLUMNS, USUAL = 12, 9
 """Most columns of an extrapolation, and how many steps aim at."""
@@ -63,14 +61,12 @@ class Stretch(NamedTuple):
     samples: Array
     """Coordinates then, in the first columns (m, MOST)."""
     arm: Array
-    """Above which values guards are armed, and at which they fire (guards,), as
-    `coordinates.arm_guards` says."""
+    """Values above which guards are armed, and at which they fire, of `coordinates.arm_guards`."""
     level: Array
 
 
 def _interpolate(x: float, z: Array, F: Array, out: Array) -> None:
-    """Coordinates at a share x of a step that began at z, from the coefficients F of its
-    interpolant."""
+    """Coordinates at a share x of a step begun at z, from the coefficients F of its interpolant."""
     for i in range(len(z)):
         value = 0.0
         for n in range(len(F)):
@@ -91,8 +87,7 @@ def _root(
     now: Array,
     values: Array,
 ) -> float:
-    """Share of a step within (low, high) at which a guard falls through its level, to the last
-    digit of the time.
+    """Share of a step in (low, high) at which a guard falls through its level, to round-off.
 
     By the rule of false position, whose end that stays counts half the next time (Illinois); halved
     where that is slow."""
@@ -139,8 +134,7 @@ def _weighted_sum(weights: Array, count: int, K: Array, out: Array) -> None:
 def _interpolant(
     t: float, h: float, k: System, z: Array, new: Array, K: Array, now: Array, F: Array
 ) -> None:
-    """Coefficients F of the interpolant of a step from z to `new`, from its stages K; three of
-    these it computes."""
+    """Coefficients F of the interpolant of a step from z to `new`; computes three more stages K."""
     for s in range(len(C_MORE)):
         _weighted_sum(A_MORE[s], STAGES + 1 + s, K, now)
         for i in range(len(z)):
@@ -168,8 +162,7 @@ def _first_fall(
     now: Array,
     values: Array,
 ) -> tuple[int, float]:
-    """The guard that falls through its level first in a step, or -1, and the share of the step at
-    which it does.
+    """The guard that first falls through its level in a step, or -1, and at which share of it.
 
     `seen` (LOOKS_A_STEP + 1, guards) holds their values at both ends, and takes those between.
     """
@@ -204,8 +197,7 @@ def _first_fall(
 
 
 def _first_length(share: float, rate: Array, left: float, of: Stretch) -> float:
-    """Length of a first step, in which rates would change coordinates by a share of their size,
-    s."""
+    """Length of a first step, s, in which coordinates would change by a share of their size."""
     fastest = 0.0
     for i in range(len(rate)):
         fastest = max(fastest, abs(rate[i]) / (of.scale[i] / FINER + abs(of.z[i])))
@@ -213,8 +205,7 @@ def _first_length(share: float, rate: Array, left: float, of: Stretch) -> float:
 
 
 def _time_to_stop(rate: Array, rtol: float, of: Stretch) -> float:
-    """The time that a slip which dies has left, along a straight line; inf if a direction turns too
-    much for it."""
+    """Time that a dying slip has left, along a straight line; inf if a direction turns too much."""
     left, (first, end) = math.inf, coordinates.TURNING[of.k.case]
     for i in range(first, end, 2):
         if of.z[i] < DYING * of.scale[i] and rate[i] < 0:
@@ -395,8 +386,7 @@ def _extrapolation_step(
 def implicit_steps(
     of: Stretch, start: float, tau: float, h: float, taken: int
 ) -> tuple[int, float, float, int, int]:
-    """As `explicit_steps`, by implicit ones: for `STIFF_STEPS` steps, or until all slips are
-    `GROWN_SLIP`.
+    """As `explicit_steps`, by `STIFF_STEPS` implicit ones, or until all slips are `GROWN_SLIP`.
 
     A Jacobian shifts z by a share of it, or at least of its natural size, or of the tolerance times
     that for a slip."""

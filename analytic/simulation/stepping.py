@@ -38,11 +38,9 @@ LOCATING = 10
 LANDINGS = 20
 """Most landings that are located within a step; later ones are put at its end."""
 SLIDES = 4.0
-"""A contact slides on through a step if it takes more than this many times the load of the step to
-stop it."""
+"""A contact slides through a step if to stop it takes more than this many times the step's load."""
 ZERO_SLIP = 1e-9
-"""Sliding speed relative to sqrt(g R) up to which a contact is called rolling: above what
-iterations leave."""
+"""Sliding speed relative to sqrt(g R) up to which a contact rolls: above what iterations leave."""
 
 
 class Constants(NamedTuple):
@@ -124,8 +122,7 @@ class Touching(NamedTuple):
 
 
 class Stretches(NamedTuple):
-    """Stretches of equal steps from each sample or knot of the flow to the next, arrays (n,); and
-    the flow."""
+    """Equal steps from each sample or knot of the flow to the next, arrays (n,); and the flow."""
 
     start: Array
     dt: Array
@@ -280,8 +277,7 @@ def _work(u: Velocities, middle: Middle, A: Impulse, B: Impulse, dt: float, p: C
 
 
 def _old_slip(at: BallState, dt: float, p: Constants) -> Slips:
-    """Slip velocities of A and B before the step, m s-1; set to zero where slip may stop within the
-    step.
+    """Slip velocities of A and B before the step, m s-1; zero where slip may stop within it.
 
     It is added to the new one, since friction opposes the mean of both where a contact slides on;
     where it may stop, friction opposes the final slip, so that it can't reverse."""
@@ -328,8 +324,7 @@ def _moved(at: BallState, dt: float, s: StepSolution, touching: Touching, R: flo
 
 
 def _crossing(gap: float, rate: float, end: float, dt: float) -> float:
-    """When within dt a gap passes zero, by the parabola with its value and rate at first and its
-    value `end` then."""
+    """When within dt a gap passes zero, by the parabola of its value and rate, and its `end`."""
     bend = 2 * (end - gap - rate * dt) / (dt * dt)
     root = math.sqrt(max(0.0, rate * rate - 2 * bend * gap))
     time = 2 * gap / (root - rate) if rate < 0 else (rate + root) / -bend
@@ -399,8 +394,7 @@ def step(ball: Ball, dt: float, omega_0: float, p: Constants) -> Ball:
 
 
 def _impact(at: BallState, dt: float, in_A: bool, in_B: bool, p: Constants) -> StepSolution:
-    """An impact, with Newton's restitution; a rebound that would last less than a hundredth of a
-    step is none."""
+    """An impact, with Newton's restitution; a rebound below a hundredth of a step is none."""
     to_A = -p.e * at.u.v_y if in_A and -p.e * at.u.v_y > p.g * dt / 200 else 0.0
     to_B = -p.e * at.u.v_h if in_B and -p.e * at.u.v_h > p.g * dt / 200 else 0.0
     hit = solve(at, 0.0, 0.0, Touching(in_A, in_B, to_A, to_B), NOTHING, p)
@@ -411,8 +405,7 @@ def _impact(at: BallState, dt: float, in_A: bool, in_B: bool, p: Constants) -> S
 
 
 def _case_of(s: StepSolution, touching: Touching, p: Constants) -> int:
-    """The case from velocities and impulses: a contact that leaves is open, one that doesn't slide
-    rolls."""
+    """The case by velocities and impulses: a contact that leaves is open, one at rest rolls."""
     A, B, still = AWAY, AWAY, ZERO_SLIP * math.sqrt(p.g * p.R)
     slip_A, slip_B = rigid_body.slip_at_A(s.new, p), rigid_body.slip_at_B(s.new, p)
     if touching.A and (s.P.A_y > 0 or s.new.v_y <= 0):
@@ -454,8 +447,7 @@ def _keep_sample(ball: Ball, P: Forces, dt: float, p: Constants, run: Rows) -> N
 def follow(
     ball: Ball, place: Progress, stretches: Stretches, p: Constants, run: Rows, most: int
 ) -> tuple[Any, Progress]:
-    """Follow a run for at most so many steps, or to its end, where it doesn't converge, or is over:
-    ball and place.
+    """Follow a run to its end, a step that doesn't converge, or for so many: ball and place.
 
     The ball is in parts (`ball_from_parts`). The first sample, before any step, carries the forces
     and the case of the first step. A run that has been quiet for long ends at that sample; the

@@ -65,8 +65,7 @@ def sample_forces(run: Rows, p: Parameters) -> Array:
 def prepared(
     x: State, theta: float, p: Parameters, flow: Flow, settings: Settings, times: Array
 ) -> tuple[stepping.Ball, stepping.Stretches, stepping.Constants]:
-    """What the compiled loop takes: the ball in a state that no step has led to, its steps in the
-    flow, and constants.
+    """What the compiled loop takes: the ball before any step, steps in the flow, and constants.
 
     Raises `InputError` if the time step is too large for the problem.
     """

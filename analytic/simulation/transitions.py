@@ -40,22 +40,18 @@ from analytic.simulation.motion import HybridState
 from model import State
 
 LEAST_ACCELERATION = 1e-9
-"""Acceleration in units of g below which a contact point is at rest, well above what the contact
-problem leaves."""
+"""Acceleration in units of g below which a contact rests, above what the contact problem leaves."""
 AT_ONSET = 1e-7
-"""Slip margin up to which slip is at its onset: the accelerations are hardly more than
-`LEAST_ACCELERATION`."""
+"""Slip margin at the onset of slip: accelerations are hardly more than `LEAST_ACCELERATION`."""
 
 EPS = math.ulp(1.0)
 AT_REST = 1e-12
-"""Slip after an impact, relative to the speeds before it, that counts as none: the contact problem
-leaves less."""
+"""Slip after an impact, relative to speeds before, that is none: what is solved leaves less."""
 UNSETTLED = "the contact problem doesn't settle"
 
 
 def react(guard: int, case: int, at: HybridState, k: System) -> tuple[int, HybridState, Forces]:
-    """What follows when a guard has fired: the next case, the hybrid state at its start, and
-    impulses of an impact."""
+    """What follows when a guard has fired: next case, hybrid state, and impulses of an impact."""
     x, A, B = at.x, case // 3, case % 3
     still = 10 * k.rtol * k.spin  # slip that counts as zero where the other contact has just stuck
     if guard in (A_SLIPS, B_SLIPS):
@@ -169,8 +165,7 @@ def _contact(closed: bool, s: float, t: float) -> Closed:
 def _by_accelerations(
     at: HybridState, A: Closed, B: Closed, start: Forces, k: System
 ) -> tuple[int, HybridState]:
-    """Case and slip directions by the contact problem of the accelerations, solved from the forces
-    `start`."""
+    """Case and slip directions by the contact problem of accelerations, from the forces `start`."""
     free = equations.smooth_rates(rigid_body.velocities(at.x, k), at.x.h, at.time, k)
     rates, force, settled = contact_problem.solve(free, A, B, k, start, LEAST_ACCELERATION / 1e4)
     if not settled:
@@ -186,8 +181,7 @@ def _by_accelerations(
 def _contact_after(
     contact: Closed, load: float, rise: float, s: float, t: float, k: System
 ) -> tuple[int, float, float]:
-    """State of a contact from its force and accelerations, and the direction in which it slips if
-    it does."""
+    """State of a contact from its force and accelerations, and the direction of its slip."""
     still = LEAST_ACCELERATION * k.g
     if not contact.closed or (load <= 0 and rise > still):
         return AWAY, 0.0, 0.0
@@ -197,8 +191,7 @@ def _contact_after(
 
 
 def collide(at: HybridState, k: System) -> tuple[HybridState, Forces]:
-    """The hybrid state after an impact, and its impulses: all contacts that touch at once, by
-    Newton's restitution.
+    """Hybrid state after an impact, and impulses: all contacts at once, by Newton's restitution.
 
     Friction opposes the slip that is left. A single contact of a sphere obeys p_n = (1+e) m |v_n|
     and p_t = min(friction p_n, m_t |slip|) against the slip; two contacts are solved together,

@@ -1,2 +1,1 @@
-"""Stability with respect to slipping and lifting: growth rates, and the flows at which slip sets
-in."""
+"""Stability with respect to slipping and lifting: growth rates, and where slip sets in."""

@@ -1,5 +1,4 @@
-"""Where slip begins to grow (sections 3.2 and 4): gamma in closed form along each arrow, with its
-zero and its slope.
+"""Where slip begins to grow (3.2, 4): gamma in closed form along each arrow, its zero and slope.
 
 Out of NR gamma is known at every state, (56)-(61). Where the ball goes round with the fluid gamma
 is a straight line in omega_0^2, (61), (67), (74), (82), (83): `SlipBound`. At a fixed omega_c, for
@@ -29,8 +28,7 @@ class SlipBound:
 
     @property
     def zero(self) -> float:
-        """omega_0^2 (rad2 s-2) at which slip neither grows nor dies out; inf where gamma doesn't
-        depend on the flow.
+        """omega_0^2 (rad2 s-2) where slip neither grows nor dies out; inf if gamma has no slope.
 
         Negative: no flow reaches it.
         """
@@ -78,8 +76,7 @@ class HeldBound:
 
 
 def gamma_nr(beta: npt.ArrayLike, x: npt.ArrayLike, p: Parameters) -> Array:
-    """gamma (56) in rad s-2 of a slip of the wall contact along beta (rad) out of states x (..., 6
-    or 8) of NR.
+    """gamma (56), rad s-2, of a slip at B along beta (rad) out of states x (..., 6 or 8) of NR.
 
     Shapes broadcast; `InputError` if x isn't a state of NR.
     """
@@ -88,8 +85,7 @@ def gamma_nr(beta: npt.ArrayLike, x: npt.ArrayLike, p: Parameters) -> Array:
 
 
 def steepest_nr(x: npt.ArrayLike, p: Parameters) -> Array:
-    """beta_1 (58) in rad: the direction along which slip at the wall grows the most out of states x
-    (...) of NR.
+    """beta_1 (58), rad: the direction in which slip at the wall grows the most out of states of NR.
 
     Along beta_2 = beta_1 + pi it dies out the fastest: a state is stable where gamma along beta_1
     is negative, (59)."""
@@ -98,8 +94,7 @@ def steepest_nr(x: npt.ArrayLike, p: Parameters) -> Array:
 
 
 def nr_to_ns(p: Parameters) -> SlipBound:
-    """(60), (61): slip of the wall contact out of the stationary NR, along beta = 0, where it grows
-    the most."""
+    """(60), (61): slip at B out of the stationary NR, along beta = 0, where it grows most."""
     unit = (1 + p.j) / (p.j * p.r)
     return SlipBound(unit * p.g, -unit * p.eta * p.R)
 
@@ -114,8 +109,7 @@ def rr_to_rs(p: Parameters, omega_c: float, side: int) -> HeldBound:
 
 
 def rr_to_rs_stationary(p: Parameters) -> SlipBound:
-    """(67): slip at B, of either side, where omega_c = omega_0; it dies out at every flow but
-    omega_0 = 0."""
+    """(67): slip at B, either side, where omega_c = omega_0; it dies out unless omega_0 = 0."""
     return SlipBound(0.0, -p.eta * (1 + 2 * p.j) * p.R / (p.j * p.r))
 
 
@@ -147,8 +141,7 @@ def rr_to_ss(p: Parameters, side: int) -> SlipBound:
 
 
 def filippov_share(outer: Case, omega_c: float, p: Parameters) -> float:
-    """delta of (69): f_RR = delta f^- + (1 - delta) f^+, with f^+- the sides of RR in `outer`, RS
-    or SR.
+    """delta of (69): f_RR = delta f^- + (1 - delta) f^+, f^+- the sides of RR in `outer`, RS or SR.
 
     From the growths of slip on the two sides, whose combination must not slip. 0 < delta < 1 where
     slip dies out on both sides (or grows on both: SR beyond omega_03); inf if neither side has

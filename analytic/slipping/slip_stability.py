@@ -1,5 +1,4 @@
-"""Stability with respect to slipping (section 3): does a slight slip, or lift, out of a rolling
-case die out or grow?
+"""Stability with respect to slipping (section 3): does a slight slip, or lift, die out or grow?
 
 From a state x* of a case Y the ball is pushed along n into a case Z of more freedom (the arrows of
 Fig. 6, and NR->NS); gamma(x*, n) = lim f_Z(x* + eps n) . n (53), in the paper's Euclidean product,
@@ -45,8 +44,7 @@ class SlipStability(Enum):
 
 
 def normals(inner: Case, outer: Case) -> tuple[str, ...]:
-    """Names of the components of slip that the case `outer` frees and `inner` holds at zero; they
-    span W (51)."""
+    """Names of the slips that `outer` frees and `inner` holds at zero; they span W (51)."""
     return tuple(
         name for name in _SLIPS if name in TRAITS[outer].active and name not in TRAITS[inner].active
     )
@@ -55,8 +53,7 @@ def normals(inner: Case, outer: Case) -> tuple[str, ...]:
 def slip_rates(
     inner: Case, outer: Case, x: npt.ArrayLike, n: npt.ArrayLike, p: Parameters
 ) -> tuple[Array, Array, Array]:
-    """Rates (..., d) of the slips that begin along n, (52) by component, and the normal forces A_y,
-    B_x in N (...).
+    """Rates (..., d) of slips that begin along n (52), and the normal forces A_y, B_x in N (...).
 
     x is one state of `inner`, n directions (..., d) over `normals`, of any length. A negative
     normal force means that the contact opens instead of slipping that way."""
@@ -87,8 +84,7 @@ def gamma(inner: Case, outer: Case, x: npt.ArrayLike, n: npt.ArrayLike, p: Param
 
 
 def lift_acceleration(inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters) -> float:
-    """v_y' in m s-2 of the case without the floor, at a state with it: the ball lifts if it is
-    positive.
+    """v_y', m s-2, of the case without the floor at a state with it: the ball lifts if it is > 0.
 
     This is (53) for the dotted arrows of Fig. 6, with n along v_y.
     """
@@ -96,8 +92,7 @@ def lift_acceleration(inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters)
 
 
 def lift_onset(inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters) -> float:
-    """omega_c in rad s-1 at which the ball begins to lift, at states else like x in a flow as much
-    faster than it.
+    """omega_c, rad s-1, at which the ball begins to lift, else as in x, in as much faster a flow.
 
     Out of SR slip_x is in proportion to omega_c. Looked for between a tenth and ten times omega_c
     of x; nan where it lifts at both or at none."""
@@ -114,8 +109,7 @@ def lift_onset(inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters) -> flo
 
 
 def stability(case: Case, p: Parameters, omega_c: float | None = None) -> SlipStability:
-    """Stability with respect to slipping of the stationary solution of a case at omega_c, p.omega_0
-    if None.
+    """Slip stability of the stationary solution of a case at omega_c, p.omega_0 if None.
 
     RR: (67), and (82) if eta < j, else (74): beyond omega_03 slip at A alone would need A_y < 0,
     and so would slip at both if eta > j, so that for eta < j, mu > 1 rolling goes on beyond
@@ -143,8 +137,7 @@ def stability(case: Case, p: Parameters, omega_c: float | None = None) -> SlipSt
 
 
 def neutral_flow(case: Case, p: Parameters) -> float:
-    """The flow in rad s-1 at which a stationary motion is neutral (Definition 3), between stable
-    and unstable.
+    """Flow, rad s-1, at which a stationary motion is neutral (Definition 3).
 
     Looked for between a thousandth and a thousand times sqrt(g/R), by bisection down to round-off;
     nan if it is the same at both. p.omega_0 plays no part."""
@@ -157,8 +150,7 @@ def neutral_flow(case: Case, p: Parameters) -> float:
 
 
 def _by_sign(drive: float, hold: float) -> SlipStability:
-    """Unstable if drive > hold, stable if less, neutral within the round-off of both, which are >=
-    0."""
+    """Unstable if drive > hold, stable if less, neutral within round-off; both are >= 0."""
     if abs(drive - hold) <= 8 * np.finfo(float).eps * max(drive, hold):
         return SlipStability.NEUTRAL
     return SlipStability.UNSTABLE if drive > hold else SlipStability.STABLE

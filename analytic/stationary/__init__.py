@@ -1,2 +1,1 @@
-"""Stationary solutions of each case, with forces, existence and stability; the branch of slipping
-at both points."""
+"""Stationary solutions of each case, their forces, existence, stability; the branch of SS."""

@@ -1,5 +1,4 @@
-"""The branch of stationary solutions that slip at both points (SS): (37)-(42), its fold (87)-(90),
-its stability.
+"""The branch of stationary slipping at both points (SS): (37)-(42), its fold (87)-(90), stability.
 
 The branch is given in the groups of the model: Omega = omega sqrt(R/g), kappa = c sqrt(R/g), forces
 in units of m g, speeds in units of sqrt(g R). A point on it is given by ``s = ln|tan alpha|``, from
@@ -93,8 +92,7 @@ def slope(
 
 
 def characteristic_slope(s: npt.ArrayLike, p: Parameters) -> Array:
-    """d omega_c/d omega_0 along the branch: 0 at the end in RR, infinite at the fold, negative
-    beyond it."""
+    """d omega_c/d omega_0 along the branch: 0 at the end in RR, infinite at the fold, then < 0."""
     orbit, lag = _slopes(s, p)
     return np.asarray(orbit / (orbit + lag))
 
@@ -105,8 +103,7 @@ def _slopes(
     mu: npt.ArrayLike | None = None,
     eta: npt.ArrayLike | None = None,
 ) -> tuple[Array, Array]:
-    """d Omega_c/d|alpha|, and that of the lag Omega_0 - Omega_c, both without the factor that
-    `slope` leaves out."""
+    """d Omega_c/d|alpha| and d(Omega_0 - Omega_c)/d|alpha|, without the factor as in `slope`."""
     at = branch(s, p, mu, eta)
     mu, eta = _friction(p, mu, eta)
     turned = 1 + 2 * mu * eta * at.cos - eta * at.cos**2
@@ -118,14 +115,12 @@ def _slopes(
 
 
 def light_drag(p: Parameters) -> float:
-    """The stiffness where the lag vanishes, at both ends of the branch: kappa, but 0 for the
-    quadratic law."""
+    """The stiffness where the lag vanishes, at both ends: kappa, but 0 for the quadratic law."""
     return float(drag.coefficient(0.0, p)) * float(np.sqrt(p.R / p.g))
 
 
 def eta_critical(mu: npt.ArrayLike, p: Parameters) -> Array:
-    """eta_cr (87): the fold exists for larger eta only; inf for mu = 0 with drag, nan without
-    either.
+    """eta_cr (87): the fold needs larger eta; inf for mu = 0 with drag, nan without either.
 
     The fold is born in SR, where the lag vanishes: for every law the drag of a slight lag decides.
     """
@@ -161,8 +156,7 @@ def fold(
 
 
 def points_at(p: Parameters) -> list[float]:
-    """All places s of the branch that belong to the flow p.omega_0 > 0, in the order of |alpha|; []
-    if none.
+    """Places s of the branch in the flow p.omega_0 > 0, in the order of |alpha|; [] if none.
 
     The first part of the branch, from RR to the fold, rises with Omega_0, the second falls; each
     gives at most one."""
@@ -193,8 +187,7 @@ def _denominator(cos: Array, j: float, mu: Array, eta: Array) -> Array:
 
 
 def states(s: npt.ArrayLike, p: Parameters) -> tuple[Array, Array]:
-    """States (..., 8) of SS at places s of its branch (`slipping_branch`), and their flows omega_0
-    (37), (41)."""
+    """States (..., 8) of SS at places s of its branch, and their flows omega_0 (37), (41)."""
     b = branch(s, p)
     unit, w = np.sqrt(p.g / p.R), b.v_A * np.sqrt(p.g * p.R) / p.r
     turn = np.sign(p.eta - p.j) * b.sin

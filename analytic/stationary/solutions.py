@@ -28,8 +28,7 @@ _MIRROR = State(1.0, 1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0)
 _MIRROR_FORCE = np.array([1.0, 1.0, -1.0])
 """Signs of state and forces of the other sense of rotation."""
 _LEAST_REAL_PART = 1e-9
-"""Real part divided by modulus below which an eigenvalue counts as imaginary: the pair of NS is so,
-exactly."""
+"""Real part divided by modulus below which an eigenvalue is imaginary, as the pair of NS is."""
 
 
 class Stability(Enum):
@@ -56,8 +55,7 @@ class StationarySolution:
     force_B: Array
     """Force of the wall, N, shape (3,)."""
     eigenvalues: npt.NDArray[np.complex128]
-    """Of the Jacobian in the active variables (in NS without the cyclic y), rad s-1, rightmost
-    first."""
+    """Of the Jacobian in the active variables (in NS without y), rad s-1, rightmost first."""
     exists: bool
     """Whether the contact forces obey (12) and (13)."""
     stability: Stability
@@ -86,16 +84,14 @@ class StationarySolution:
 
     @property
     def moves(self) -> bool:
-        """Whether the ball sinks along the wall all the same: stationary but for y (NS, Proposition
-        6)."""
+        """Whether the ball sinks along the wall, stationary but for y (NS, Proposition 6)."""
         return bool(self.state.v_y != 0)
 
 
 def stationary_solutions(
     p: Parameters, cases: Collection[Case] = tuple(Case)
 ) -> list[StationarySolution]:
-    """All stationary solutions at p.omega_0, or those of some cases, in the order of `Case`; SS by
-    |alpha|.
+    """Stationary solutions at p.omega_0, or those of some cases, in the order of `Case`, |alpha|.
 
     Solutions with inadmissible forces are listed with ``exists`` False. For omega_0 = 0 there are
     RR, RS and NS; for c = 0 RR, SR and NR, with omega_c undetermined in RR; SS needs mu, c > 0 and
@@ -142,15 +138,13 @@ def solution(
 
 
 def stable_solutions(p: Parameters, sinking: bool = False) -> list[StationarySolution]:
-    """The stationary solutions that a disturbed ball returns to; not the one that only sinks (NS)
-    unless `sinking`."""
+    """Solutions that a disturbed ball returns to; not NS, which only sinks, unless `sinking`."""
     those = [s for s in stationary_solutions(p) if s.exists and s.stable]
     return [s for s in those if (sinking if s.moves else s.slip_stable)]
 
 
 def slowest_time_constant(of: StationarySolution) -> float:
-    """Slowest time constant in s of the disturbances that die out within the case; inf if none does
-    exponentially."""
+    """Slowest time constant, s, of what dies out within the case; inf if nothing exponentially."""
     check_type("of", of, StationarySolution)
     if of.stability is Stability.ALGEBRAIC:
         return np.inf
@@ -181,8 +175,7 @@ def _solution(
     family: tuple[str, ...] = (),
     values: npt.NDArray[np.complex128] | None = None,
 ) -> StationarySolution:
-    """The stationary solution at a state x, with forces and stability; eigenvalues by the Jacobian
-    unless given."""
+    """The stationary solution at a state x; eigenvalues by the Jacobian unless given."""
     if p.c == 0:  # nothing pulls omega_c to omega_0
         family = (*family, "omega_c")
     force = dynamics.forces(case, x, p, p.omega_0)
@@ -212,8 +205,7 @@ def _solution(
 
 
 def _stability(values: npt.NDArray[np.complex128], zeros: int, neutral: bool) -> Stability:
-    """Stability by the rightmost eigenvalue, but for as many `zeros` as belong to the free
-    variables of a family."""
+    """Stability by the rightmost eigenvalue, but for the `zeros` of a family's free variables."""
     rest = values[np.argsort(np.abs(values))][zeros:]
     if np.any(rest.real > _LEAST_REAL_PART * np.abs(rest)):
         return Stability.UNSTABLE
@@ -221,16 +213,14 @@ def _stability(values: npt.NDArray[np.complex128], zeros: int, neutral: bool) ->
 
 
 def _rr(p: Parameters) -> list[StationarySolution]:
-    """Proposition 1: the ball rolls round with the fluid. Without drag every omega_c is
-    stationary."""
+    """Proposition 1: the ball rolls with the fluid. Without drag every omega_c is stationary."""
     best = rolling_forces.least_utilisation(p.omega_0, p)
     exists = bool(best.utilisation <= 1 and not np.isnan(best.B_y))
     return [_solution(Case.RR, p, State(omega_c=p.omega_0), exists)]
 
 
 def _rs(p: Parameters) -> list[StationarySolution]:
-    """Proposition 2: the ball spins on the spot, if the fluid rests or drags nothing; on a smooth
-    wall, anywhere."""
+    """Proposition 2: spinning on the spot, if the fluid rests or has no drag; or a smooth wall."""
     if p.eta > 0 and p.c > 0 and p.omega_0 != 0:
         return []
     omega_c = p.omega_0 if p.eta == 0 else 0.0
@@ -276,8 +266,7 @@ def _nr(p: Parameters) -> list[StationarySolution]:
 
 
 def _ns(p: Parameters) -> list[StationarySolution]:
-    """Proposition 6: sinking along the wall at a constant speed; none without drag, which alone
-    limits the speed."""
+    """Proposition 6: sinking along the wall at a constant speed, which drag alone limits."""
     sink = p.g - p.eta * p.R * p.omega_0**2
     if p.c == 0 or sink <= 0:
         return []
@@ -297,8 +286,7 @@ def _wall_carries(p: Parameters) -> bool:
 
 
 def eigenmodes_SR(p: Parameters) -> tuple[npt.NDArray[np.complex128], npt.NDArray[np.complex128]]:
-    """Eigenvalues (2,) in rad s-1 of f_SR at its stationary solution, and unit vectors (2, 2), one
-    a row.
+    """Eigenvalues (2,), rad s-1, of f_SR at its stationary solution; unit vectors as rows (2, 2).
 
     There A_y = 0, the border to NR (Proposition 3): the eigenvalues show on the side A_y > 0 only,
     where the ball leans on the floor; on the other it lifts off. The first mode is that of the
