@@ -7,8 +7,7 @@ the sphere is greater by. A law is that factor as a function of Re:
 * ``schiller-naumann``: 1 + 0.15 Re^0.687, and from where that is less (Re = 989) that of a constant
   C_D = 0.44 (Schiller and Naumann 1935; Clift, Grace and Weber, "Bubbles, Drops, and Particles",
   1978);
-* ``quadratic``: C_D Re/24 with a constant C_D.
-"""
+* ``quadratic``: C_D Re/24 with a constant C_D."""
 
 from __future__ import annotations
 

@@ -82,8 +82,7 @@ def reading(path: str | Path, ours: bool = True) -> Iterator[h5py.File]:
 def dataset(file: h5py.File, name: str) -> h5py.Dataset:
     """The dataset of that name, stored in this very file: links out of it are not followed.
 
-    Raises `StorageError`, for `reading` to add the name of the file.
-    """
+    Raises `StorageError`, for `reading` to add the name of the file."""
     if not isinstance(file.get(name, getlink=True), h5py.HardLink):
         raise StorageError(f"it has no dataset {name!r} of its own")
     stored = file[name]

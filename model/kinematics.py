@@ -48,8 +48,7 @@ class State(NamedTuple):
         """The state in a sequence of 6 or 8 numbers, as floats, or the states in an array (..., 6
         or 8), as columns.
 
-        A `State` is returned as it is. Raises `InputError` as `full_state`.
-        """
+        A `State` is returned as it is. Raises `InputError` as `full_state`."""
         if isinstance(x, State):
             return x
         columns = np.moveaxis(full_state(x), -1, 0)
@@ -110,8 +109,7 @@ def rotated(quaternion: Array, vector: Array) -> Array:
 def full_state(x: npt.ArrayLike) -> Array:
     """Return states of shape (..., 8), adding h = v_h = 0 to states of shape (..., 6).
 
-    Raises `InputError` for what isn't numbers, for another length or a value that is not finite.
-    """
+    Raises `InputError` for what isn't numbers, for another length or a value that is not finite."""
     try:
         state = np.asarray(x, dtype=float)
     except (TypeError, ValueError) as error:
@@ -147,8 +145,7 @@ def slip_velocities(x: npt.ArrayLike, p: Parameters) -> tuple[Array, Array]:
     """Velocities v_A, v_B of the lowest and the outermost point of the ball, each (..., 3), m s-1.
 
     (6) with its first row completed by v_y and v_h: v_A = (v_h + v_y + r w_z, v_y, -r w_x),
-    v_B = (v_h, -r w_z, r w_y).
-    """
+    v_B = (v_h, -r w_z, r w_y)."""
     _, v_y, _, w_x, w_y, w_z, _, v_h = State.of(x)
     v_A = np.stack([v_h + v_y + p.r * w_z, v_y, -p.r * w_x], axis=-1)
     v_B = np.stack([v_h, -p.r * w_z, p.r * w_y], axis=-1)
@@ -175,8 +172,7 @@ def to_world(x: npt.ArrayLike, theta: npt.ArrayLike, p: Parameters) -> Motion:
 def from_world(motion: Motion, p: Parameters) -> tuple[State, Array]:
     """States, as columns, and azimuths theta (...) of a motion in the world; inverse of `to_world`.
 
-    On the axis itself the orbit has no direction: theta is 0 there and omega_c is nan.
-    """
+    On the axis itself the orbit has no direction: theta is 0 there and omega_c is nan."""
     px, py, pz = np.moveaxis(motion.position, -1, 0)
     theta, rho = np.arctan2(py, px), np.hypot(px, py)
     axes = frame(theta)

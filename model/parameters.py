@@ -138,8 +138,7 @@ class Parameters:
     ------
     InputError
         If a value is not a finite number in its range, or the law of drag lacks the fluid's
-        viscosity; the message names field, value, unit and range.
-    """
+        viscosity; the message names field, value, unit and range."""
 
     m: float = _quantity("m", "kg", "mass of the ball", POSITIVE)
     r: float = _quantity("r", "m", "radius of the ball", POSITIVE)
@@ -231,8 +230,7 @@ class Parameters:
         nu_f : kinematic viscosity of the fluid, m2 s-1, > 0
         rho_f, rho_b : densities of fluid and ball, kg m-3; the ball must be the denser
         gravity : gravitational acceleration in vacuum, m s-2
-        r, j, rest : R, mu, eta and omega_0 (0 if not given), drag and C_D, as in `Parameters`
-        """
+        r, j, rest : R, mu, eta and omega_0 (0 if not given), drag and C_D, as in `Parameters`"""
         given = {
             "nu_f": (nu_f, "m2 s-1"),
             "rho_f": (rho_f, "kg m-3"),

@@ -101,8 +101,7 @@ def save_batch(runs: Mapping[str, Trajectory], path: str | Path) -> None:
 def load(path: str | Path) -> Trajectory:
     """Read a trajectory from a file, or from one of many as ``FILE/NAME``.
 
-    Raises `StorageError`, in one line, for a file that isn't one or is damaged.
-    """
+    Raises `StorageError`, in one line, for a file that isn't one or is damaged."""
     path = Path(path)
     if not path.parent.is_file():
         with reading(path) as file:
@@ -118,8 +117,7 @@ def load(path: str | Path) -> Trajectory:
 def contents(path: str | Path) -> tuple[str, list[str]]:
     """The version of dualball that wrote a file, and the names of its runs; none of a single run.
 
-    Raises `StorageError` as `load` does.
-    """
+    Raises `StorageError` as `load` does."""
     with reading(path) as file:
         version = str(_attribute(file.attrs, "versions", dict).get("dualball"))
         return version, dataset(file, "run").asstr()[...].tolist() if "run" in file else []

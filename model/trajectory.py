@@ -98,8 +98,7 @@ class Trajectory:
     Arrays have shape (n,), forces (n, 3) along `AXES`; `events` are changes of case, `header` says
     what was simulated.
 
-    COLUMNS
-    """
+    COLUMNS"""
 
     header: Header
     time: Array = _column("s", "time")
@@ -283,8 +282,7 @@ SAMPLE = np.dtype([(name, meta["dtype"], meta["shape"]) for name, meta in _SAMPL
 def samples(time: Array, theta: Array, x: State, p: Parameters) -> npt.NDArray[np.void]:
     """Samples (n,) of dtype `SAMPLE` with gaps and slip speeds; forces and case are for the caller.
 
-    time, theta and the columns of x have shape (n,).
-    """
+    time, theta and the columns of x have shape (n,)."""
     block = np.zeros(len(time), SAMPLE)
     block["time"], block["theta"] = time, theta
     for name, column in x._asdict().items():

@@ -26,8 +26,7 @@ class RunBackend(BackendEntrypoint):
     ) -> xarray.Dataset:
         """A run's file: the columns of `Trajectory.table` along the time, cases by name, no events.
 
-        Raises `StorageError`, in one line, for a file that isn't a run or is damaged.
-        """
+        Raises `StorageError`, in one line, for a file that isn't a run or is damaged."""
         from model import storage  # here, because xarray loads this module whatever it is to open
 
         if not isinstance(filename_or_obj, str | os.PathLike):

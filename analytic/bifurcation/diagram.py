@@ -29,15 +29,13 @@ class Thresholds:
     eta_cr: float
     """(87): c^2 R/(4 g mu^2), but 0 for the quadratic law of drag.
 
-    inf for mu = 0 (no fold at any eta), nan for mu = c = 0.
-    """
+    inf for mu = 0 (no fold at any eta), nan for mu = c = 0."""
 
 
 def thresholds(p: Parameters) -> Thresholds:
     """Flows, rad s-1, at which stationary solutions change; nan for none. (84)-(88)
 
-    p.omega_0 plays no part. The law of drag shifts omega_04 and eta_cr only.
-    """
+    p.omega_0 plays no part. The law of drag shifts omega_04 and eta_cr only."""
     check_type("p", p, Parameters)
     Omega = threshold_curves(p, p.mu, p.eta)
     unit = np.sqrt(p.g / p.R)
@@ -127,8 +125,7 @@ class DoublePoint:
 def double_points(p: Parameters, equal: bool = False) -> list[DoublePoint]:
     """Where the curves of Fig. 7 meet, or with `equal` friction mu = eta those of Fig. 8.
 
-    At eta_cr, for equal friction (kappa^2/4)^(1/3), where the fold is born; and at eta = j.
-    """
+    At eta_cr, for equal friction (kappa^2/4)^(1/3), where the fold is born; and at eta = j."""
     unit = np.sqrt(p.g / p.R)
     light = slipping_branch.light_drag(p)
     eta_cr = float(np.cbrt(light**2 / 4) if equal else slipping_branch.eta_critical(p.mu, p))

@@ -72,8 +72,7 @@ def reading_range(p: Parameters) -> float:
 def unloading_limit(p: Parameters) -> float:
     """omega_02 in rad s-1: a ball on the wall (NR) stays there above; below it sinks and lands.
 
-    nan for a smooth wall, which carries no ball.
-    """
+    nan for a smooth wall, which carries no ball."""
     return bifurcation.thresholds(p).omega_02
 
 
@@ -85,8 +84,7 @@ def characteristic_slope(p: Parameters, case: Case | None = None) -> float:
     case : which attractor; needed between omega_02 and omega_04 only, where SS lags and SR and NR
         don't
 
-    Raises `InputError` if there is no attractor (of that case), or if `case` is needed.
-    """
+    Raises `InputError` if there is no attractor (of that case), or if `case` is needed."""
     followed = stationary.stable_solutions(p) if case is None else [stationary.solution(p, case)]
     if p.c == 0 or not followed:
         raise InputError(

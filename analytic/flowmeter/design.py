@@ -124,8 +124,7 @@ def readings(p: Parameters, omega_0: npt.ArrayLike) -> tuple[Array, Array]:
 def response_time(p: Parameters) -> float:
     """Time constant (1 + 2j)/c, s, with which a rolling ball follows the flow (docs/theory.md, 9).
 
-    inf for the quadratic law, whose drag has no part linear in the lag.
-    """
+    inf for the quadratic law, whose drag has no part linear in the lag."""
     return math.inf if p.drag == drag.QUADRATIC or p.c == 0 else (1 + 2 * p.j) / p.c
 
 

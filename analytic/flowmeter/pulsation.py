@@ -105,8 +105,7 @@ def slip_onset(p: Parameters, frequency: float, leave_rolling: str = "slip-stabi
     """Least amplitude, rad s-1, at which slip begins at some phase; frequency > 0 in Hz.
 
     By the margin of `Settings.leave_rolling` along `swing`; on rough floors and at high frequencies
-    "infeasible" gives a larger amplitude. 0 where the mean flow alone ends RR, inf without drag.
-    """
+    "infeasible" gives a larger amplitude. 0 where the mean flow alone ends RR, inf without drag."""
     margin = _MARGINS[leave_rolling]
     if p.c == 0:
         return math.inf

@@ -49,8 +49,7 @@ class Rolling:
 def torque_rate(spin: Real, p: Parameters, layer: bool = True) -> Real:
     """Rate k, s-1, at which the fluid's torque brakes a spin, rad s-1; by Stokes unless `layer`.
 
-    p.fluid_torque takes the place of both if it is given.
-    """
+    p.fluid_torque takes the place of both if it is given."""
     if p.fluid_torque:
         return p.fluid_torque + 0.0 * spin
     stokes, Re = 4 * p.c / (3 * p.j), spin * p.r**2 / p.nu_f if p.nu_f else 0.0 * spin

@@ -49,8 +49,7 @@ def transfer(p: Parameters, case: Case, frequency: npt.ArrayLike) -> npt.NDArray
 def step_response(p: Parameters, case: Case, t: npt.ArrayLike) -> Array:
     """Change of omega_c at t >= 0 (s) after a small jump of the flow, divided by it; same shape.
 
-    About the stable motion of the case at p.omega_0, as in `transfer`.
-    """
+    About the stable motion of the case at p.omega_0, as in `transfer`."""
     J, b, own = _linearised(p, case)
     rates, modes = np.linalg.eig(J)
     shares = modes[own] * np.linalg.solve(modes, b.astype(complex))

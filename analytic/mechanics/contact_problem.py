@@ -36,8 +36,7 @@ target of 0. Where mu > 1, sticking and slipping may both obey the law. The solu
 the one near the first guess: with the impulses of the last step the ball goes on rolling until no
 impulses near the present ones hold it.
 
-All on plain floats, and compiled.
-"""
+All on plain floats, and compiled."""
 
 from __future__ import annotations
 
@@ -125,8 +124,7 @@ def solve(
     start : first guess of the impulses in N s; only those of B matter
     tolerance : the largest change in a sweep at which to stop, relative to the velocities of the
         problem, those that the impulses cause among them; a sweep rounds a dozen times, so that
-        less than `EXACT` may never be reached
-    """
+        less than `EXACT` may never be reached"""
     a, b = needs(free, A.target, B.target, ((0.0, 0.0), (0.0, 0.0)), p)
     at_A = at_B = NO_IMPULSE
     mu, eta, settled = Friction(p.mu, A.s, A.t), Friction(p.eta, B.s, B.t), True

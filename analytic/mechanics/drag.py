@@ -120,8 +120,7 @@ def sinking_speed(*, nu_f: float, rho_f: float, rho_b: float, r: float, gravity:
     """Terminal speed v, m s-1, of a sphere: weight less buoyancy is 6 pi rho_f nu_f r v.
 
     nu_f is the kinematic viscosity of the fluid, m2 s-1; rho_f and rho_b are densities of fluid and
-    sphere, kg m-3; r is the radius, m; gravity is in vacuum, m s-2.
-    """
+    sphere, kg m-3; r is the radius, m; gravity is in vacuum, m s-2."""
     heavier = 4 / 3 * math.pi * r**3 * (rho_b - rho_f) * gravity
     return heavier / (6 * math.pi * rho_f * nu_f * r)
 
@@ -129,8 +128,7 @@ def sinking_speed(*, nu_f: float, rho_f: float, rho_b: float, r: float, gravity:
 def fall(t: float, y: float, v_y: float, p: Any) -> tuple[float, float]:
     """Height (m) and vertical velocity (m s-1) after a time t (s) of flight with Stokes' drag.
 
-    p : anything with c and g
-    """
+    p : anything with c and g"""
     return y + v_y * t - (p.c * v_y + p.g) * t**2 * ramp_lag(p.c * t), fall_speed(t, v_y, p)
 
 

@@ -49,8 +49,7 @@ def vector_field(
         dx/dt, shape of x. Whether the contact forces are admissible is not checked, see
         `contact_forces`.
 
-    Raises `InputError` if x isn't a state of the case (`check_state`).
-    """
+    Raises `InputError` if x isn't a state of the case (`check_state`)."""
     case = Case(case)
     state, fluid = _checked(case, x, p, omega_0)
     return rates(case, state, p, fluid).stacked()[..., : np.shape(x)[-1]]

@@ -75,8 +75,7 @@ def _last_share(u: Array, z: Array, p: Parameters) -> Array:
     """B_y in units of m g at which RR ends: the most that the wall's cone allows, up to j u, which
     turns the spin axis.
 
-    0 where the cone has nothing left, beyond (66).
-    """
+    0 where the cone has nothing left, beyond (66)."""
     k = (1 + p.j) * u
     return np.asarray(np.minimum(np.maximum(k - _normal_forces(k, z, p.eta)[0], 0.0), p.j * u))
 

@@ -107,8 +107,7 @@ class OrbitBranch:
 def follow(start: Orbit, name: str, low: float, high: float, most: int = 100) -> OrbitBranch:
     """Follow an orbit both ways in a parameter to [low, high], its end, or `most` orbits each way.
 
-    Raises `InputError` if there is no such parameter, or the orbit isn't within the range.
-    """
+    Raises `InputError` if there is no such parameter, or the orbit isn't within the range."""
     check_names(
         [name], [*(field.name for field in Parameters.quantities()), RESTITUTION], "parameter"
     )

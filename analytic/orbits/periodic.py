@@ -63,8 +63,7 @@ class NoOrbitError(ArithmeticError):
 class Loop:
     """A state within a case and the section through it, on which one active variable has its value.
 
-    The other active variables, in natural units, are the d - 1 coordinates of the section.
-    """
+    The other active variables, in natural units, are the d - 1 coordinates of the section."""
 
     p: Parameters
     case: Case
@@ -128,8 +127,7 @@ class Loop:
     def moved(self, by: Array, varied: str | None = None) -> Loop:
         """The loop moved by coordinates (d - 1,), and by the logarithm of what is `varied`, (d,).
 
-        Raises `NoOrbitError` where that leads out of the range of the parameter.
-        """
+        Raises `NoOrbitError` where that leads out of the range of the parameter."""
         x = self.x.copy()
         x[self.free] += by[: len(self.free)] * state_units(self.p)[self.free]
         if self.case is Case.RN:

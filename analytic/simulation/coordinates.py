@@ -142,8 +142,7 @@ def _begin_off_wall(
 def hybrid_state(t: Any, z: Any, at: HybridState, k: System) -> HybridState:
     """The state with azimuth and work at a time t, from coordinates z of a case begun at `at`.
 
-    An azimuth off the wall is given up to whole turns.
-    """
+    An azimuth off the wall is given up to whole turns."""
     if k.case % 3 == AWAY:
         return _hybrid_state_off_wall(t, z, at, k)
     y, v_y, omega_c, w_x, w_y, w_z, alpha, beta = 0.0, 0.0, z[1], 0.0, 0.0, 0.0, math.nan, math.nan

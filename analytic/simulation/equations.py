@@ -129,8 +129,7 @@ def forces(
 ) -> tuple[float, float, float, float, float, float]:
     """Forces of floor and wall along i, j, k in the cases at the wall, N; in RR with B_y = 0.
 
-    `lag` is omega_c - omega_0; s and c are sine and cosine of the directions of slip.
-    """
+    `lag` is omega_c - omega_0; s and c are sine and cosine of the directions of slip."""
     u, G, drive, j = k.m * k.R * omega_c * omega_c, k.m * k.g, k.m * k.R * c * lag, k.j
     if case == RR:
         z = j * drive / (1 + 2 * j)

@@ -139,8 +139,7 @@ def run_through_flow(
     which doesn't look whether it has got them.
 
     pieces : rows of start, end, the `equations.Line` of the flow, and whether it jumps at the start
-    steps : in a stride, at most
-    """
+    steps : in a stride, at most"""
     at, case, begun, at_once = stage
     for n in range(max(begun - 1, 0), len(pieces)):
         piece = pieces[n]

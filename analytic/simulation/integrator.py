@@ -44,8 +44,7 @@ def first_pace(
 def finish_straight(t: float, of: Stretch, taken: int) -> int:
     """Fill in the rest of a stretch if a straight line solves it: samples taken, else -1.
 
-    What moves by less than the tolerance is taken to rest.
-    """
+    What moves by less than the tolerance is taken to rest."""
     k, until, z, scale, times, samples, arm, _ = of
     if len(k.waves) > 0 or k.line.slope != 0:
         return -1

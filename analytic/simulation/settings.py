@@ -26,8 +26,7 @@ HUGE, MAX_RADIANS = 1e3, 1e5
 class Settings:
     """How to simulate.
 
-    Raises `InputError` if a value is out of range.
-    """
+    Raises `InputError` if a value is out of range."""
 
     method: str = "event"
     """``event``: integrate case by case and locate every change of case. ``time-stepping``:

@@ -59,8 +59,7 @@ def simulate(
         If an argument is of another type or out of range, or the ball starts inside floor or
         wall, or with a speed into one it touches (unless ``initial_impact``).
     SimulationError
-        If the run can't go on, or `progress` ends it; it carries the samples so far.
-    """
+        If the run can't go on, or `progress` ends it; it carries the samples so far."""
     check_type("p", p, Parameters)
     check_type("flow", flow, Flow | None)
     check_type("settings", settings, Settings | None)

@@ -164,8 +164,7 @@ def _first_fall(
 ) -> tuple[int, float]:
     """The guard that first falls through its level in a step, or -1, and at which share of it.
 
-    `seen` (LOOKS_A_STEP + 1, guards) holds their values at both ends, and takes those between.
-    """
+    `seen` (LOOKS_A_STEP + 1, guards) holds their values at both ends, and takes those between."""
     fired, end = -1, 2.0
     for look in range(1, LOOKS_A_STEP):
         _interpolate(look / LOOKS_A_STEP, z, F, now)

@@ -67,8 +67,7 @@ def prepared(
 ) -> tuple[stepping.Ball, stepping.Stretches, stepping.Constants]:
     """What the compiled loop takes: the ball before any step, steps in the flow, and constants.
 
-    Raises `InputError` if the time step is too large for the problem.
-    """
+    Raises `InputError` if the time step is too large for the problem."""
     t_end = float(times[-1])
     problem = p, flow, t_end, partial(drag.coefficient, p=p), x
     shortest, _ = time_scales.shortest_time(*problem)

@@ -5,8 +5,7 @@ only if every slight slip dies out: at two rolling contacts that is `rolling_for
 a single one this means that its cone holds forces that keep it rolling (docs/theory.md). Case and
 slip directions are then those of the contact problem of the accelerations.
 
-All on plain floats, cases and guards by number, and compiled.
-"""
+All on plain floats, cases and guards by number, and compiled."""
 
 from __future__ import annotations
 
@@ -105,8 +104,7 @@ def with_directions(at: HybridState, x: State, alpha: float, beta: float) -> Hyb
 def choose(at: HybridState, k: System) -> tuple[int, HybridState]:
     """The case in which a ball goes on, and the hybrid state with the directions of slip.
 
-    Contacts are closed where gap and normal speed are exactly zero, and still where the slip is.
-    """
+    Contacts are closed where gap and normal speed are exactly zero, and still where the slip is."""
     x = at.x
     slip_x = x.v_h + x.v_y + k.r * x.slip_z
     # round-off of a ball that rolls on the floor away from the wall

@@ -30,8 +30,7 @@ class SlipBound:
     def zero(self) -> float:
         """omega_0^2 (rad2 s-2) where slip neither grows nor dies out; inf if gamma has no slope.
 
-        Negative: no flow reaches it.
-        """
+        Negative: no flow reaches it."""
         return -self.offset / self.slope if self.slope else math.inf
 
     def gamma(self, omega_0: npt.ArrayLike) -> Array:
@@ -43,8 +42,7 @@ class SlipBound:
 class HeldBound:
     """gamma = side * push/((1+j) r) - hold in rad s-2, of a ball that rolls at omega_c.
 
-    The fluid's push is c(|w|) w in m s-2 with w = R (omega_0 - omega_c).
-    """
+    The fluid's push is c(|w|) w in m s-2 with w = R (omega_0 - omega_c)."""
 
     p: Parameters
     omega_c: float
@@ -78,8 +76,7 @@ class HeldBound:
 def gamma_nr(beta: npt.ArrayLike, x: npt.ArrayLike, p: Parameters) -> Array:
     """gamma (56), rad s-2, of a slip at B along beta (rad) out of states x (..., 6 or 8) of NR.
 
-    Shapes broadcast; `InputError` if x isn't a state of NR.
-    """
+    Shapes broadcast; `InputError` if x isn't a state of NR."""
     pull, lag, friction = _nr_terms(x, p)
     return np.asarray(pull * np.cos(beta) + lag * np.sin(beta) - friction)
 
@@ -103,8 +100,7 @@ def rr_to_rs(p: Parameters, omega_c: float, side: int) -> HeldBound:
     """(66) with eta for its mu: slip at B along slip_y > 0 (side 1) or < 0 (side -1) of a ball that
     rolls at omega_c.
 
-    For Stokes' law zero at omega_0 = omega_c + side * eta (1+j)(1+2j) omega_c^2/(j c).
-    """
+    For Stokes' law zero at omega_0 = omega_c + side * eta (1+j)(1+2j) omega_c^2/(j c)."""
     return HeldBound(p, omega_c, side, p.eta * (1 + 2 * p.j) * p.R * omega_c**2 / (p.j * p.r))
 
 
@@ -116,8 +112,7 @@ def rr_to_rs_stationary(p: Parameters) -> SlipBound:
 def rr_to_sr(p: Parameters, omega_c: float, side: int) -> HeldBound:
     """(73): slip at A along slip_x > 0 (side 1) or < 0 (side -1) of a ball that rolls at omega_c.
 
-    For Stokes' law zero at omega_0 = omega_c - side * (1+2j) mu (g - j R omega_c^2)/(j R c).
-    """
+    For Stokes' law zero at omega_0 = omega_c - side * (1+2j) mu (g - j R omega_c^2)/(j R c)."""
     weight = p.g - p.j * p.R * omega_c**2
     return HeldBound(p, omega_c, -side, p.mu * (1 + 2 * p.j) * weight / (p.j * (1 + p.j) * p.r))
 

@@ -86,8 +86,7 @@ def gamma(inner: Case, outer: Case, x: npt.ArrayLike, n: npt.ArrayLike, p: Param
 def lift_acceleration(inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters) -> float:
     """v_y', m s-2, of the case without the floor at a state with it: the ball lifts if it is > 0.
 
-    This is (53) for the dotted arrows of Fig. 6, with n along v_y.
-    """
+    This is (53) for the dotted arrows of Fig. 6, with n along v_y."""
     return float(dynamics.rates(outer, dynamics.check_state(inner, x, p), p, p.omega_0).v_y)
 
 
@@ -115,8 +114,7 @@ def stability(case: Case, p: Parameters, omega_c: float | None = None) -> SlipSt
     and so would slip at both if eta > j, so that for eta < j, mu > 1 rolling goes on beyond
     omega_03, to omega_01 (`slip_margin`). SR and NR: (61). RS: the friction j m R omega_c^2 that
     its floor must supply. These are the signs of the work done on a slight slip, over all
-    directions along which the contacts stay closed; on a threshold, to round-off, it is neutral.
-    """
+    directions along which the contacts stay closed; on a threshold, to round-off, it is neutral."""
     Omega2 = p.R / p.g * (p.omega_0 if omega_c is None else omega_c) ** 2
     match case:
         case Case.RR:
