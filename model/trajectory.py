@@ -37,17 +37,11 @@ def _column(
     equation: str = "",
     shape: tuple[int, ...] = (),
     dtype: Any = np.float64,
-    **more: Any,
+    **default: Any,
 ) -> Any:
     """Declare a field that is a column of the HDF5 file, with its metadata."""
-    about = {
-        "units": units,
-        "long_name": long_name,
-        "equation": equation,
-        "shape": shape,
-        "dtype": dtype,
-    }
-    return field(repr=False, metadata=about, **more)
+    about = {"units": units, "long_name": long_name, "equation": equation}
+    return field(repr=False, metadata=about | {"shape": shape, "dtype": dtype}, **default)
 
 
 FLUID: Mapping[str, Any] = {
@@ -208,28 +202,21 @@ class Trajectory:
         return cls(header=header, events=events, **columns)
 
 
-def _event_column(
-    units: str, long_name: str, shape: tuple[int, ...] = (), dtype: Any = np.float64
-) -> Any:
-    """As `_column`, of the table of events, which may be empty."""
-    return _column(
-        units, long_name, "", shape, dtype, default_factory=lambda: np.empty((0, *shape), dtype)
-    )
+_TIMES: dict[str, Any] = {"default_factory": lambda: np.empty(0)}
+_CASES: dict[str, Any] = {"dtype": np.int8, "default_factory": lambda: np.empty(0, np.int8)}
+_IMPULSES: dict[str, Any] = {"shape": (3,), "default_factory": lambda: np.empty((0, 3))}
+_ON_BALL = "on the ball, zero without impact"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Events:
     """Changes of case and impacts, arrays of shape (k,) or (k, axis)."""
 
-    time: Array = _event_column("s", "time of the event, located between time steps")
-    from_case: npt.NDArray[np.int8] = _event_column("1", "case before the event", dtype=np.int8)
-    to_case: npt.NDArray[np.int8] = _event_column("1", "case after the event", dtype=np.int8)
-    impulse_A: Array = _event_column(
-        "N s", "impulse of the floor on the ball, zero without impact", (3,)
-    )
-    impulse_B: Array = _event_column(
-        "N s", "impulse of the wall on the ball, zero without impact", (3,)
-    )
+    time: Array = _column("s", "time of the event, located between time steps", **_TIMES)
+    from_case: npt.NDArray[np.int8] = _column("1", "case before the event", **_CASES)
+    to_case: npt.NDArray[np.int8] = _column("1", "case after the event", **_CASES)
+    impulse_A: Array = _column("N s", f"impulse of the floor {_ON_BALL}", **_IMPULSES)
+    impulse_B: Array = _column("N s", f"impulse of the wall {_ON_BALL}", **_IMPULSES)
 
     def __len__(self) -> int:
         return len(self.time)

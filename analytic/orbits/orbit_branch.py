@@ -15,18 +15,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
 
-from analytic.orbits.periodic import (
-    RESTITUTION,
-    Changes,
-    NoOrbitError,
-    Orbit,
-    close_loop,
-    closed_orbit,
-    defect_jacobian,
-    extent,
-    landings,
-    refine,
-)
+from analytic.orbits import periodic
+from analytic.orbits.periodic import Changes, NoOrbitError, Orbit, landings, refine
 from model import InputError, Parameters, State
 from model.arrays import Array
 from model.parameters import check_names, check_number
@@ -108,9 +98,8 @@ def follow(start: Orbit, name: str, low: float, high: float, most: int = 100) ->
     """Follow an orbit both ways in a parameter to [low, high], its end, or `most` orbits each way.
 
     Raises `InputError` if there is no such parameter, or the orbit isn't within the range."""
-    check_names(
-        [name], [*(field.name for field in Parameters.quantities()), RESTITUTION], "parameter"
-    )
+    names = [*(field.name for field in Parameters.quantities()), periodic.RESTITUTION]
+    check_names([name], names, "parameter")
     low = check_number(f"lowest {name}", low, "SI")
     high = check_number(f"highest {name}", high, "SI")
     if not low <= (value := start.loop.value(name)) <= high or value == 0:
@@ -135,7 +124,7 @@ def _one_way(
     along = np.append(np.zeros(len(start.loop.free)), sign)
     try:
         for _ in range(most):
-            matrix = defect_jacobian(here.loop, here.derivative, name)
+            matrix = periodic.defect_jacobian(here.loop, here.derivative, name)
             tangent = np.linalg.svd(matrix)[2][-1]
             along = tangent if tangent @ along >= 0 else -tangent
             there = None
@@ -156,7 +145,7 @@ def _one_way(
             step = min(LONGEST_STEP, 1.5 * step if there.steps <= EASY else 0.7 * step)
             # The same orbit through a section anew: on the floor orbits may shrink away from one.
             if State.of(there.loop.x).y > 0:
-                here = replace(there, loop=replace(there.loop, extent=extent(there.cycle)))
+                here = replace(there, loop=replace(there.loop, extent=periodic.extent(there.cycle)))
             else:
                 here = refine(there.p, there.loop.x, there.period, there.loop.restitution)
                 if (here.loop.case, here.loop.fixed) != (there.loop.case, there.loop.fixed):
@@ -183,12 +172,12 @@ def _at_end_of_range(inside: Orbit, outside: Orbit, name: str, span: tuple[float
     share = (value - start) / (end - start)
     x = inside.loop.x + share * (outside.loop.x - inside.loop.x)
     period = (1 - share) * inside.period + share * outside.period
-    return closed_orbit(replace(inside.loop.with_value(name, value), x=x, period=period))
+    return periodic.closed_orbit(replace(inside.loop.with_value(name, value), x=x, period=period))
 
 
 def _next_orbit(here: Orbit, by: Array, name: str, matrix: Array) -> Orbit:
     """The next orbit, a step `by` away; `NoOrbitError` also if it is of another branch."""
-    orbit = closed_orbit(here.loop.moved(by, name), name, matrix)
+    orbit = periodic.closed_orbit(here.loop.moved(by, name), name, matrix)
     if _on_other_branch(here, by, orbit.changes):
         raise NoOrbitError("the nearest orbit is one of another branch")
     return orbit
@@ -221,7 +210,7 @@ def _places_between(
     for _ in range(HALVINGS):
         middle = (low + high) / 2
         try:
-            found, back, _ = close_loop(here.loop.moved(middle * step, name), name, matrix)
+            found, back, _ = periodic.close_loop(here.loop.moved(middle * step, name), name, matrix)
         except NoOrbitError:
             break
         if _on_other_branch(here, middle * step, back.changes):
@@ -229,7 +218,7 @@ def _places_between(
         loop = found
         low, high = (middle, high) if _rotated_to_least(back.changes) == before else (low, middle)
     try:
-        nearest = closed_orbit(loop)
+        nearest = periodic.closed_orbit(loop)
     except NoOrbitError:  # disturbances there land where others don't
         nearest = there
     same = sum(landings(here.changes)) == sum(landings(there.changes))

@@ -24,48 +24,12 @@ import numpy as np
 
 from analytic.mechanics import drag, rigid_body
 from analytic.simulation import equations
-from analytic.simulation.equations import (
-    A_LANDS,
-    A_LIFTS,
-    A_SLIPS,
-    A_STICKS,
-    AWAY,
-    B_LANDS,
-    B_OPENS,
-    B_SLIPS,
-    B_STICKS,
-    FINER,
-    NN,
-    NO_FALL,
-    NS,
-    RN,
-    RR_ENDS,
-    RS,
-    SLIPS,
-    SN,
-    SR,
-    SS,
-    Fall,
-    System,
-)  # fmt: skip
+from analytic.simulation.equations import AWAY, NN, NS, RN, RS, SLIPS, SN, SR, SS, Fall, System
 from analytic.simulation.motion import HybridState
 from model import State
 
 MOST = 8
 """Most coordinates of a case."""
-NONE = -1
-ENDS = (
-    (RR_ENDS, NONE, NONE, NONE),
-    (B_STICKS, A_SLIPS, NONE, NONE),
-    (A_SLIPS, B_LANDS, NONE, NONE),
-    (A_STICKS, B_SLIPS, A_LIFTS, NONE),
-    (A_STICKS, B_STICKS, A_LIFTS, B_OPENS),
-    (A_STICKS, B_LANDS, NONE, NONE),
-    (A_LANDS, B_SLIPS, NONE, NONE),
-    (A_LANDS, B_STICKS, NONE, NONE),
-    (B_LANDS, A_LANDS, NONE, NONE),
-)
-"""What can end each case, by number; at the wall what coordinates show, then what forces do."""
 TURNING = ((0, 0), (0, 0), (0, 0), (0, 0), (2, 6), (4, 6), (0, 0), (5, 7), (0, 0))
 """Of each case where among the coordinates slips that turn begin and end, directions between."""
 
@@ -74,11 +38,7 @@ def count_guards(k: System) -> int:
     """How many guards the motion has; the landing of a fall that is known needs none."""
     if k.case == NN:
         return 1 if k.fall.landing < math.inf else 2
-    count = 0
-    for end in ENDS[k.case]:
-        if end != NONE:
-            count += 1
-    return count
+    return equations.COUNT_OF_ENDS[k.case]
 
 
 def begin(case: int, at: HybridState, k: System, z: Any, scale: Any) -> tuple[System, int]:
@@ -110,7 +70,7 @@ def _begin_on_wall(case: int, at: HybridState, k: System, z: Any, scale: Any) ->
             z[n], scale[n] = direction, 1.0
             n += 1
     z[n], scale[n] = at.work, k.m * k.g * k.R
-    return equations.in_case(k, case, side, k.line, NO_FALL), n + 1
+    return equations.in_case(k, case, side, k.line, equations.NO_FALL), n + 1
 
 
 def _begin_off_wall(
@@ -123,7 +83,7 @@ def _begin_off_wall(
     (`drag.fall`). With another law c depends on all components of the velocity."""
     turn = cmath.exp(1j * at.theta)
     u, speed = rigid_body.velocities(at.x, k), k.R / k.unit
-    n, fall = 4, NO_FALL
+    n, fall = 4, equations.NO_FALL
     place, moves = (k.R - at.x.h) * turn, turn * complex(-u.v_h, u.v_k)
     z[0], z[1], z[2], z[3] = place.real, place.imag, moves.real, moves.imag
     scale[0], scale[1], scale[2], scale[3] = k.R, k.R, speed, speed
@@ -217,8 +177,9 @@ def arm_guards(values: Any, k: System, arm: Any, level: Any) -> bool:
     absolute tolerance first, or to fall below -`rtol`; a gap is armed by any height."""
     opens = False
     for guard in range(len(level)):
-        gap = ENDS[k.case][guard] == A_LANDS or ENDS[k.case][guard] == B_LANDS
-        arm[guard] = 0.0 if gap else k.rtol / FINER
+        end = equations.ENDS[k.case][guard]
+        gap = end == equations.A_LANDS or end == equations.B_LANDS
+        arm[guard] = 0.0 if gap else k.rtol / equations.FINER
         level[guard] = 0.0 if values[guard] > arm[guard] else -k.rtol
         opens = opens or (gap and values[guard] == 0)
     return opens

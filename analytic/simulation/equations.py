@@ -19,6 +19,20 @@ from model.arrays import Array
 RR, RS, RN, SR, SS, SN, NR, NS, NN = (int(case) for case in Case)
 A_STICKS, B_STICKS, A_SLIPS, B_SLIPS, A_LIFTS, B_OPENS, A_LANDS, B_LANDS, RR_ENDS = range(9)
 """What ends a case."""
+NONE = -1
+ENDS = (
+    (RR_ENDS, NONE, NONE, NONE),
+    (B_STICKS, A_SLIPS, NONE, NONE),
+    (A_SLIPS, B_LANDS, NONE, NONE),
+    (A_STICKS, B_SLIPS, A_LIFTS, NONE),
+    (A_STICKS, B_STICKS, A_LIFTS, B_OPENS),
+    (A_STICKS, B_LANDS, NONE, NONE),
+    (A_LANDS, B_SLIPS, NONE, NONE),
+    (A_LANDS, B_STICKS, NONE, NONE),
+    (B_LANDS, A_LANDS, NONE, NONE),
+)
+"""What can end each case, by number; at the wall what coordinates show, then what forces do."""
+COUNT_OF_ENDS = tuple(sum(end != NONE for end in ends) for ends in ENDS)
 ROLLS, SLIPS, AWAY = range(3)
 """Contacts: with the floor a case's number divided by three, with the wall the remainder."""
 FINER = 1e3
@@ -219,7 +233,7 @@ def rates(t: float, z: Any, k: System, out: Any) -> None:
 
 
 def guards(t: float, z: Any, k: System, out: Any) -> None:
-    """What is positive while a case lasts, in natural units, in the order of `coordinates.ENDS`."""
+    """What is positive while a case lasts, in natural units, in the order of `ENDS`."""
     if k.case % 3 == AWAY:
         return _guards_away(t, z, k, out)
     omega_c, v_y, w_x, _, q_A, s_A, c_A, q_B, s_B, c_B, _ = _wall_state(z, k)

@@ -16,17 +16,9 @@ import numpy as np
 from analytic.mechanics import dynamics
 from analytic.mechanics.rigid_body import Forces
 from analytic.simulation import compiling, coordinates, equations, motion, transitions
-from analytic.simulation.coordinates import NONE
-from analytic.simulation.equations import A_LANDS, AWAY, System
+from analytic.simulation.equations import A_LANDS, AWAY, NONE, System
 from analytic.simulation.integrator import StalledError, first_pace, stretch
-from analytic.simulation.motion import (
-    HybridState,
-    Recorder,
-    Rows,
-    count_landings,
-    keep_event,
-    keep_sample,
-)
+from analytic.simulation.motion import HybridState, Recorder, Rows
 from analytic.simulation.settings import LANDED, Settings
 from analytic.simulation.solvers import DONE, FIRED, STUCK, Stretch
 from model import Case, Contact, Flow, Parameters, State
@@ -86,7 +78,7 @@ def follow(
         raise StalledError("steps become too short")
     fired = NONE
     if why == FIRED:
-        fired = coordinates.ENDS[case][guard]
+        fired = equations.ENDS[case][guard]
     elif lands and why == DONE:
         fired = A_LANDS
     return fired, _with_nearest_azimuth(coordinates.hybrid_state(now, z, at, k), k, near)
@@ -113,7 +105,7 @@ def _keep_samples(of: Stretch, at: HybridState, taken: int, run: Rows) -> float:
 
 def _keep_sample(at: HybridState, k: System, run: Rows) -> None:
     """Store a hybrid state as the next sample, and what its forces follow from."""
-    row = keep_sample(at.x, k.case, run)
+    row = motion.keep_sample(at.x, k.case, run)
     if len(run.path) > 0:
         run.path[row, :5] = at.theta, at.work, at.alpha, at.beta, equations.fluid(at.time, k)
 
@@ -124,8 +116,8 @@ def _keep_event(
     """Store a change of case or an impact, and count landings."""
     least = LANDED * k.m * math.sqrt(k.g * k.R) * (1 + k.restitution)
     if max(impulse.A_y, impulse.B_x) > least:
-        count_landings(at.time, 1, run)
-    keep_event(at.time, case, after, impulse, run)
+        motion.count_landings(at.time, 1, run)
+    motion.keep_event(at.time, case, after, impulse, run)
 
 
 @compiling.compiled

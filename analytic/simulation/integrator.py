@@ -10,17 +10,9 @@ import math
 
 import numpy as np
 
-from analytic.simulation import coordinates, equations
+from analytic.simulation import coordinates, equations, solvers
 from analytic.simulation.equations import ONSET_SLIP, SMALL_SLIP, STIFF_STEPS
-from analytic.simulation.solvers import (
-    DONE,
-    OTHER,
-    PAUSED,
-    STUCK,
-    Stretch,
-    explicit_steps,
-    implicit_steps,
-)
+from analytic.simulation.solvers import DONE, OTHER, PAUSED, STUCK, Stretch
 from model.arrays import Array
 
 Pace = tuple[float, float, float, bool, int]
@@ -76,9 +68,9 @@ def stretch(of: Stretch, pace: Pace, taken: int, most: int) -> tuple[int, Pace, 
         if end >= 0:
             return DONE, (start, tau, h, small, slow), -1, end
         if small:
-            why, tau, h, guard, taken = implicit_steps(of, start, tau, h, taken)
+            why, tau, h, guard, taken = solvers.implicit_steps(of, start, tau, h, taken)
         else:
-            why, tau, h, guard, taken = explicit_steps(of, start, tau, h, taken, most)
+            why, tau, h, guard, taken = solvers.explicit_steps(of, start, tau, h, taken, most)
         total = 0.0
         for value in of.z:
             total += value

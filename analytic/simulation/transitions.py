@@ -15,26 +15,7 @@ from analytic.mechanics import contact_problem, rigid_body
 from analytic.mechanics.contact_problem import ABSENT, EXACT, RESTS, Closed, NotConvergedError
 from analytic.mechanics.rigid_body import NOTHING, Forces, Velocities
 from analytic.simulation import equations
-from analytic.simulation.equations import (
-    A_LANDS,
-    A_LIFTS,
-    A_SLIPS,
-    A_STICKS,
-    AWAY,
-    B_OPENS,
-    B_SLIPS,
-    B_STICKS,
-    FINER,
-    RN,
-    ROLLS,
-    RR,
-    RR_ENDS,
-    RS,
-    SLIPS,
-    SR,
-    SS,
-    System,
-)  # fmt: skip
+from analytic.simulation.equations import AWAY, RN, ROLLS, RR, RS, SLIPS, SR, SS, System
 from analytic.simulation.motion import HybridState
 from model import State
 
@@ -53,33 +34,33 @@ def react(guard: int, case: int, at: HybridState, k: System) -> tuple[int, Hybri
     """What follows when a guard has fired: next case, hybrid state, and impulses of an impact."""
     x, A, B = at.x, case // 3, case % 3
     still = 10 * k.rtol * k.spin  # slip that counts as zero where the other contact has just stuck
-    if guard in (A_SLIPS, B_SLIPS):
+    if guard in (equations.A_SLIPS, equations.B_SLIPS):
         # Slip sets in against the friction of the contact that rolls so far.
         if case == RN:
             lag = x.omega_c - equations.fluid(at.time, k)
             alpha = math.atan2((k.R - x.h) * lag, -x.v_h)
             return 3 * SLIPS + B, with_directions(at, x, alpha, at.beta), NOTHING
         A_x, _, A_z, _, B_y, B_z = _forces(case, at, k)
-        if guard == A_SLIPS:
+        if guard == equations.A_SLIPS:
             return 3 * SLIPS + B, with_directions(at, x, math.atan2(A_z, -A_x), at.beta), NOTHING
         return 3 * A + SLIPS, with_directions(at, x, at.alpha, math.atan2(-B_z, B_y)), NOTHING
-    if guard == A_LIFTS:
+    if guard == equations.A_LIFTS:
         return 3 * AWAY + B, with_directions(at, x, math.nan, at.beta), NOTHING
-    if guard == B_OPENS:
+    if guard == equations.B_OPENS:
         return 3 * A + AWAY, with_directions(at, x, at.alpha, math.nan), NOTHING
-    if guard == RR_ENDS:
+    if guard == equations.RR_ENDS:
         after, at = leave(at, k)
         return after, at, NOTHING
     y, v_y, omega_c, slip_x, slip_y, slip_z, h, v_h = x
-    if guard == A_STICKS:
+    if guard == equations.A_STICKS:
         slip_x, slip_z = 0.0, -(v_h + v_y) / k.r
         if B == SLIPS and abs(slip_y) <= still:
             slip_y = 0.0
-    elif guard == B_STICKS:
+    elif guard == equations.B_STICKS:
         slip_y = slip_z = 0.0
         if A == SLIPS and abs(slip_x) <= still:
             slip_x = 0.0
-    elif guard == A_LANDS:
+    elif guard == equations.A_LANDS:
         y = 0.0
     else:
         h = 0.0
@@ -219,7 +200,7 @@ def collide(at: HybridState, k: System) -> tuple[HybridState, Forces]:
         free, RESTS if A.closed and u.v_y <= 0 else ABSENT, ABSENT, k, NOTHING, EXACT
     )
     # A hop that lasts T rises by g T^2/8, well above the tolerance of lengths.
-    integrated = math.sqrt(8 * k.rtol / FINER * k.R / k.g)
+    integrated = math.sqrt(8 * k.rtol / equations.FINER * k.R / k.g)
     known = integrated if B.closed or not k.stokes else k.rtol * k.unit
     if A.closed and 2 * v_y <= known * -on_B.v_y * (1 - e):
         v_y = 0.0
