@@ -34,6 +34,7 @@ from model.arrays import Array
 from model.errors import check_type
 from model.kinematics import UNITS, VARIABLES, check_place
 from model.parameters import POSITIVE, Range, check_number
+from model.trajectory import MOST_SAMPLES
 
 EVENT_TIMES = "located between the time steps; what jumps only to the step"
 """How exact events are, as files say."""
@@ -198,6 +199,8 @@ def sampling(t_end: float, timestep: float, sample_interval: float | None) -> tu
         sample_interval = max(t_end / 1000, timestep)
     least = Range(timestep * (1 - 1e-9))
     check_number("sample_interval", sample_interval, "s", least, "to hold a time step it")
+    least, meaning = Range(t_end / MOST_SAMPLES), f"for at most {MOST_SAMPLES:g} samples it"
+    check_number("sample_interval", sample_interval, "s", least, meaning)
     steps = max(1, round(sample_interval / timestep))
     return steps, math.floor(t_end / (steps * timestep) + 1e-9) + 1
 

@@ -44,6 +44,8 @@ def _column(
     return field(repr=False, metadata=about | {"shape": shape, "dtype": dtype}, **default)
 
 
+MOST_SAMPLES = 2e6
+"""Of a run, which is held in memory until it is written: some kilobyte each."""
 FLUID: Mapping[str, Any] = {
     "name": "omega_0",
     **_column("rad s-1", "angular velocity of the fluid").metadata,

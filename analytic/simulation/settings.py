@@ -14,8 +14,8 @@ from model import Flow, InputError, Parameters, State, time_scales
 from model.arrays import Array
 from model.kinematics import check_place
 from model.parameters import NOT_NEGATIVE, POSITIVE, Range, check_choice, check_number
+from model.trajectory import MOST_SAMPLES
 
-MAX_SAMPLES = 5e7
 LANDED = 1e-3
 """Speed relative to sqrt(g R) from which a landing counts: less is settling, or round-off."""
 HUGE, MAX_RADIANS = 1e3, 1e5
@@ -107,7 +107,7 @@ def sample_times(t_end: float, interval: float | None) -> Array:
     t_end = check_number("t_end", t_end, "s", POSITIVE)
     if interval is None:
         return np.linspace(0.0, t_end, 1001)
-    meaning = f"for at most {MAX_SAMPLES:g} samples it"
-    interval = check_number("sample_interval", interval, "s", Range(t_end / MAX_SAMPLES), meaning)
+    meaning = f"for at most {MOST_SAMPLES:g} samples it"
+    interval = check_number("sample_interval", interval, "s", Range(t_end / MOST_SAMPLES), meaning)
     count = math.ceil(t_end / interval * (1 - 4 * float(np.finfo(float).eps)))
     return np.append(np.arange(count) * interval, t_end)
