@@ -11,7 +11,7 @@ import dataclasses
 import hashlib
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -50,6 +50,7 @@ Columns = dict[str, npt.NDArray[Any]]
 """By name, an entry a run. Beside those of a collection: whether the flow is `steady`, a digest of
 all that determines the run, its `identity`, and one of its `numbers`."""
 _HELD = "steady", "identity", "numbers"
+_TEXT = "run", "engine", "drag", "failure", "identity", "numbers"
 
 
 def collect(
@@ -169,8 +170,12 @@ def _rows(path: Path, shown: Path) -> Columns:
             raise StorageError(
                 f"it holds means of another version; this program reads {MEANS_VERSION}"
             )
-        stored = {name: column(dataset(file, name)) for name in file} if schema == MEANS else {}
-    found = {n: v.astype(str) if v.dtype.kind == "O" else v for n, v in stored.items()}
+        found: Columns = {}
+        if schema == MEANS:
+            measured = [name for name in _attributes() if not name.endswith("_theory")]
+            stored = {name: column(dataset(file, name)) for name in file}
+            found = _checked(stored, [*measured, *_HELD])
+    found = {n: v.astype(str) if v.dtype.kind == "O" else v for n, v in found.items()}
     found = found or _means(storage.load_runs(path))
     theory = np.full((len(VARIABLES), len(found["run"])), math.nan)
     for k in np.flatnonzero((found["case"] >= 0) & found["steady"]).tolist():
@@ -181,6 +186,16 @@ def _rows(path: Path, shown: Path) -> Columns:
             theory[:, k] = np.where(known, solution.state, math.nan)
     found |= {f"{name}_theory": values for name, values in zip(VARIABLES, theory, strict=True)}
     return found | {"run": np.array([str(shown / name) for name in found["run"].tolist()])}
+
+
+def _checked(found: Columns, names: Collection[str]) -> Columns:
+    """The columns of these names, also of a grid; `StorageError` unless each has an entry a run, of
+    its kind."""
+    for name in names:
+        is_text, of = name in _TEXT, found[name]
+        if of.shape != found["run"].shape or (of.dtype.kind in "OU") != is_text:
+            raise StorageError(f"{name!r} is not {'a text' if is_text else 'a number'} a run")
+    return {name: of.ravel() for name, of in found.items() if name in names}
 
 
 def save_means(runs: Mapping[str, Trajectory], path: Path) -> None:
@@ -267,10 +282,10 @@ def read(path: Path) -> Columns:
                 raise StorageError(f"{held}; this program reads {SCHEMA_VERSION}")
             of, run = {name: column(dataset(file, name)) for name in file}, dataset(file, "run")
             if not run.is_scale:  # a grid
-                names = [next(iter(dimension.keys())) for dimension in run.dims]
+                names = [next(iter(dimension.keys()), "run") for dimension in run.dims]
                 places = np.meshgrid(*(of[name] for name in names), indexing="ij")
                 of |= dict(zip(names, places, strict=True))
-            return {name: values.ravel() for name, values in of.items()}
+            return _checked(of, _attributes())
     if schema not in (MEANS, storage.BATCH):
         return {}
     return {name: values for name, values in _rows(path, path).items() if name not in _HELD}

@@ -259,3 +259,19 @@ def test_what_is_no_column_of_a_foreign_file_is_said(foreign, stocked, capsys, a
         f"cannot read {foreign}: .*{re.escape(says)}",
         refused(capsys, f"compare {foreign} {foreign}"),
     )
+
+
+@pytest.mark.parametrize("means", ["", "--means-only"])
+@pytest.mark.parametrize("values", [None, ["a", "b"], [1.0], [[1.0, 2.0]], 1.0])
+@pytest.mark.parametrize("name", ["omega_c", "case", "run", "failure", "C_D"])
+def test_what_is_no_column_of_a_collection_is_said(tmp_path, capsys, means, values, name):
+    sweep = f"sweep --vary omega_0=1,2 --time 0.05 --engine event --workers 0 {means}"
+    told(capsys, f"{sweep} --quiet -o {tmp_path / 'runs'}")
+    path = next((tmp_path / "runs").glob("*.h5")) if means else tmp_path / "sweep.h5"
+    told(capsys, f"collect {tmp_path / 'runs'} -o {tmp_path / 'sweep.h5'} --workers 0")
+    with edited(path) as file:
+        del file[name]
+        if values:
+            file[name] = values
+    if name not in ("run", "failure") or values != ["a", "b"]:
+        assert name in refused(capsys, f"inspect {path} --table {tmp_path / 'new.csv'}")
