@@ -2,9 +2,8 @@
 
 The runs of a batch are one file, ``LABEL-ID.h5``, in which the name of each is `Task.key`, the hash
 of all that determines it. A file appears only when it is whole, so the directory itself is the
-record of what is done: whatever stops a campaign, starting it again does the rest. A run too long
-for memory has a file of its own, ``LABEL-KEY.h5``, and so has one that broke down,
-``LABEL-KEY.failed.h5``, with the samples it has and the reason."""
+record of what is done: whatever stops a campaign, starting it again does the rest. A run that broke
+down has a file of its own, ``LABEL-KEY.failed.h5``, with the samples it has and the reason."""
 
 from __future__ import annotations
 
@@ -28,7 +27,7 @@ import numpy as np
 
 from compare.campaign.lock import Lock
 from compare.campaign.progress import Show, show_nothing
-from compare.campaign.tasks import Task, carry_out, deadline, failed_path, store
+from compare.campaign.tasks import Task, carry_out, deadline, failed_path
 from compare.campaign.workers import Workers, first_done, processes
 from model import InputError, SimulationError, StorageError, Trajectory, storage
 from model.files import make_directory, remove_leftovers, write_text
@@ -40,7 +39,7 @@ BATCH = 64
 MOST_STEPS = 3e5
 """Of a batch of several runs: some seconds, so that progress is told."""
 HELD = 2**16
-"""Most samples of a batch, some 11 MB; a run with more is written as it comes."""
+"""Most samples of a batch, some 11 MB; a run with more is one by itself."""
 READ = 2**19
 """Samples held in memory, some 90 MB: most runs are looked at soon after. The runs of `motions` at
 the default level are more than half of that: read again and again, they took ten minutes."""
@@ -249,7 +248,7 @@ class Campaign:
             full = (
                 len(last) == self.batch or (len(last) + 1) * samples > HELD or steps > 1.001 * share
             )
-            if not last or last[0].long or full:
+            if not last or full:
                 fresh.append([])
                 steps, samples = task.steps, task.samples
             fresh[-1].append(task)
@@ -300,12 +299,7 @@ def run_batch(
     Where most are removed (`passing`) whole runs are handed out instead, unless they took long."""
     begun, whole, ended = time.process_time(), dict[str, Trajectory](), dict[str, Ended]()
     for task in tasks:
-        path = Path(f"{place}-{task.key}.h5")
         try:
-            if task.long or task.samples > HELD:
-                failure = store(task, path, limit)
-                ended[task.key] = failure, failed_path(path) if failure else path, None
-                continue
             run = carry_out(task, deadline(limit))
         except StorageError:  # a full disk is for the user to mend
             raise
@@ -315,8 +309,9 @@ def run_batch(
         if run.complete:
             whole[task.key] = run
         else:
-            storage.save(run, failed_path(path))
-            ended[task.key] = run.header.failure, failed_path(path), None
+            path = failed_path(Path(f"{place}-{task.key}.h5"))
+            storage.save(run, path)
+            ended[task.key] = run.header.failure, path, None
     if passing and time.process_time() - begun < SOON_DONE:
         ended |= {key: ("", None, run) for key, run in whole.items()}
     elif whole:

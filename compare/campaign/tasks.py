@@ -7,7 +7,6 @@ import dataclasses
 import functools
 import hashlib
 import json
-import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,7 +17,6 @@ from typing import Any
 import mujoco
 import numpy.typing as npt
 
-import mjsim
 from compare.engines import study
 from compare.engines.study import Engine
 from model import Flow, InputError, Parameters, State, Trajectory, storage
@@ -26,9 +24,6 @@ from model import Flow, InputError, Parameters, State, Trajectory, storage
 # MuJoCo would print each of its warnings, and write them to MUJOCO_LOG.TXT in the current
 # directory; a run that diverges says so itself.
 mujoco.set_mju_user_warning(lambda text: None)
-
-LONG = 1e6
-"""Steps from which on a run that hands out its samples is simulated alone, outside a batch."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,11 +95,6 @@ class Task:
         """How many samples it has, about."""
         return self.t_end / self.sample_interval if self.sample_interval else 1000
 
-    @property
-    def long(self) -> bool:
-        """Whether the run hands out its samples and takes more than `LONG` steps."""
-        return self.simulator.stream is not None and self.steps > LONG
-
 
 def deadline(limit: float) -> Callable[[float], None]:
     """A function that raises `TimeoutError` once `limit` s of real time have passed."""
@@ -117,52 +107,50 @@ def deadline(limit: float) -> Callable[[float], None]:
     return check
 
 
-def carry_out(task: Task, check: Callable[[float], None] = lambda done: None) -> Trajectory:
-    """Run a task, calling `check` from time to time with the fraction done; a run that breaks down
-    has its failure in the header."""
+def carry_out(
+    task: Task,
+    check: Callable[[float], object] = lambda done: None,
+    stop: Callable[[], bool] = lambda: False,
+) -> Trajectory:
+    """Run a task, calling `check` from time to time with the fraction done. A run that breaks down
+    has its failure in the header, and so has one that ends because `stop` says so."""
     task.simulator.check_set(task.parameters)
     if simulate := task.simulator.simulate:
-        return simulate(task, check)
-    return _start_stream(task, progress=check).trajectory()
+
+        def check_stop(done: float) -> None:
+            check(done)
+            if stop():
+                raise InterruptedError("interrupted")
+
+        return simulate(task, check_stop)
+    assert task.simulator.stream
+    _stop_timers()
+    run = task.parameters, task.x0, task.t_end, task.fluid, task.settings
+    how = {"sample_interval": task.sample_interval, "progress": check}
+    under_way, blocks, reached, stopped = task.simulator.stream(*run, **how), [], 0.0, ""
+    for block in under_way:
+        blocks.append(block)
+        # between rare samples blocks are empty
+        reached = block["time"].max(initial=reached)
+        if stop():
+            stopped = f"was stopped at t = {reached:g} s"
+            break
+    header = dataclasses.replace(under_way.header, failure=under_way.header.failure or stopped)
+    return Trajectory.from_blocks(header, blocks, under_way.events)
 
 
 def store(
     task: Task,
     path: Path,
-    limit: float = math.inf,
     stop: Callable[[], bool] = lambda: False,
     tell: Callable[[float], object] = lambda done: None,
 ) -> str:
-    """Carry out one task into a file of its own; return why the run is not whole, or nothing.
+    """Carry out one task into a file, until `stop` says so; return why the run is not whole, or
+    nothing.
 
     A run that breaks down is kept under `failed_path`, until one into the same file is whole.
-    Once `stop` says so, a run ends as if it had broken down. `tell` is called with the fraction
-    done. Raises `StorageError` if a file can't be written, `TimeoutError` if it takes longer than
-    `limit` s."""
-    check = deadline(limit)
-    if task.simulator.simulate:
-
-        def check_stop(done: float) -> None:
-            check(done)
-            tell(done)
-            if stop():
-                raise InterruptedError("interrupted")
-
-        run = carry_out(task, check_stop)
-    else:
-        under_way, stopped, reached = _start_stream(task, progress=tell), "", 0.0
-        blocks = []
-        for block in under_way:
-            check(0.0)
-            blocks.append(block)
-            # between rare samples blocks are empty
-            reached = block["time"].max(initial=reached)
-            if stop():
-                stopped = f"was stopped at t = {reached:g} s"
-                break
-        failure = under_way.header.failure or stopped
-        header = dataclasses.replace(under_way.header, failure=failure)
-        run = Trajectory.from_blocks(header, blocks, under_way.events)
+    `tell` is called with the fraction done. Raises `StorageError` if a file can't be written."""
+    run = carry_out(task, tell, stop)
     failure = run.header.failure
     storage.save(run, failed_path(path) if failure else path)
     if not failure:
@@ -173,14 +161,6 @@ def store(
 def failed_path(path: Path) -> Path:
     """The path at which a run that broke down is kept, by that of a whole run."""
     return path.with_suffix(f".failed{'.csv' if path.suffix.lower() == '.csv' else '.h5'}")
-
-
-def _start_stream(task: Task, **more: Any) -> mjsim.Run:
-    """Begin a run that hands out its samples as it goes."""
-    assert task.simulator.stream
-    _stop_timers()
-    run = task.parameters, task.x0, task.t_end, task.fluid, task.settings
-    return task.simulator.stream(*run, sample_interval=task.sample_interval, **more)
 
 
 @functools.cache
