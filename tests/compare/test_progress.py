@@ -1,6 +1,7 @@
 """What is announced of the time that is left is true on machines of any pace."""
 
 import time
+from types import SimpleNamespace
 
 import pytest
 
@@ -10,34 +11,37 @@ COSTS = {f"protocol {k}": 10.0 for k in range(30)}
 """Seconds on a machine that is free."""
 
 
+@pytest.fixture
+def clock(monkeypatch):
+    """What progress takes for the time."""
+    clock = SimpleNamespace(now=0.0)
+    monkeypatch.setattr(progress.time, "monotonic", lambda: clock.now)
+    return clock
+
+
 @pytest.mark.parametrize("pace", [0.5, 1.0, 2.0])
 @pytest.mark.parametrize("workers", [1, 4])
-def test_the_time_left_is_right_within_a_factor_of_two_after_twenty_seconds(
-    pace, workers, monkeypatch
-):
-    now, said = 0.0, []
-    monkeypatch.setattr(progress.time, "monotonic", lambda: now)
+def test_the_time_left_is_right_within_a_factor_of_two_after_twenty_seconds(pace, workers, clock):
+    said = []
     far = progress.ValidationProgress(lambda *told: said.append(told), 30, workers, COSTS)
     lasts = pace * sum(COSTS.values()) / workers
     at_once = 1 if workers == 1 else workers + 2  # each in many rounds of runs of its own
     for k in range(0, len(COSTS), at_once):
         names = list(COSTS)[k : k + at_once]
         for part in range(5 * at_once):
-            now = (k + part / 5) / len(COSTS) * lasts
+            clock.now = now = (k + part / 5) / len(COSTS) * lasts
             far.measuring(names[part % at_once], part % 3, 3, 0)
             done = said[-1][1] / said[-1][2]
             if now >= 20 and lasts - now > 0.2 * lasts:
                 extrapolated = now * (1 - done) / done  # as the reporter does
                 assert 0.5 < extrapolated / (lasts - now) < 2, (now, lasts)
-        now = (k + at_once) / len(COSTS) * lasts
+        clock.now = (k + at_once) / len(COSTS) * lasts
         for name in names:
             far.measured(name)
     assert far.left() == pytest.approx(progress.DRAWING * lasts)
 
 
-def test_what_is_stored_tells_nothing_of_the_pace(monkeypatch):
-    now = 0.0
-    monkeypatch.setattr(progress.time, "monotonic", lambda: now)
+def test_what_is_stored_tells_nothing_of_the_pace(clock):
     costs = COSTS | {"protocol 0": 0.0}  # it is there already
     far = progress.ValidationProgress(progress.show_nothing, 30, 1, costs)
     before = far.left()
@@ -52,26 +56,22 @@ def test_a_word_comes_before_anything_is_known(monkeypatch, capsys):
     assert "0 s: getting ready" in capsys.readouterr().err
 
 
-def test_silence_between_two_parts_is_no_sign_that_they_are_slow(monkeypatch):
-    now = 0.0
-    monkeypatch.setattr(progress.time, "monotonic", lambda: now)
+def test_silence_between_two_parts_is_no_sign_that_they_are_slow(clock):
     pace = progress._Pace()
     for done in range(5):
-        now = 10.0 * done
+        clock.now = 10.0 * done
         pace.note(done, 10)
-    now += 9.0
+    clock.now += 9.0
     pace.note(4, 10)  # nothing new
-    assert pace.left() == pytest.approx(100.0 - now)
+    assert pace.left() == pytest.approx(100.0 - clock.now)
 
 
-def test_another_part_has_a_pace_of_its_own(monkeypatch):
-    now = 0.0
-    monkeypatch.setattr(progress.time, "monotonic", lambda: now)
+def test_another_part_has_a_pace_of_its_own(clock):
     pace = progress._Pace()
     for total, takes in ((10, 1.0), (20, 5.0)):
         for done in range(5):
             pace.note(done, total)
-            now += takes
+            clock.now += takes
     assert pace.left() == pytest.approx(16 * 5.0 - 5.0)
 
 
