@@ -45,8 +45,7 @@ ENDS_OF_ROLLING = (*ONE_BALL, "high-wall-friction")
 DRAG_LAWS = (*ONE_BALL, "wake", "blunt")
 """One for each law of drag."""
 LIMIT_SETS = (*ENDS_OF_ROLLING, "rough-floor", "wake")
-"""Both ends of rolling, a floor rough enough for balls that slip and balls that ride the wall at
-one flow, a law of drag."""
+"""Also a floor on which balls slip, or ride the wall, at one flow; and another law of drag."""
 VARIED = (*ENDS_OF_ROLLING, "rough-floor", "thick-fluid", "wake", "blunt", "rubber-wall")
 """Those above; drag so strong that nothing folds; another law of drag; friction of the wall above
 that of the floor and the inertia. On them all wrong theories are noticed that are noticed on all
@@ -65,8 +64,7 @@ class Entry:
     """Sets that an engine in the zero-step limit measures at the quick level. At the others
     these are the first `MOST_LIMIT_SETS`, and `reference` alone where none is named here."""
     steps: tuple[int, int] = (3, 3)
-    """With how many of its time steps it does, the coarsest first: at the quick level, and
-    above."""
+    """With how many of its time steps it does, the coarsest first: at quick, and above."""
     as_it_comes: Names = ()
     """Sets that an engine with its own settings measures, at every level."""
     free: Names = ()
@@ -84,8 +82,7 @@ class Entry:
     """Why it needs the set `reference`, and no other; empty if it takes all sets."""
     numbers: int = 1
     """How many numbers there must be of a set at the quick level with the protocol's own time step,
-    measured or left out with a reason: the least that any set has by MuJoCo, event-driven
-    simulation or time stepping."""
+    or reasons: the least that any set has by MuJoCo, event-driven simulation or time stepping."""
     seconds: float = 1.0
     """Processor time at the quick level on some machine, of the engine on trial."""
 
@@ -210,10 +207,8 @@ class Sampling:
 
     halves: tuple[int, int] = (1, 2)  # what the time step of a pair of runs is divided by
     field_steps: tuple[int, int, int] = (1, 2, 4)  # the same, of three runs
-    # flows inside a bracket in each round, by which it shrinks to a half or an eighth
-    sections: int = 1
-    # whether the ends between which something is looked for are taken for granted
-    granted: bool = False
+    sections: int = 1  # flows inside a bracket in a round: it shrinks to a half, or an eighth
+    granted: bool = False  # whether the ends of what is searched through are for granted
     # whether that is measured that takes long: sinking next to the least flow that holds, folds
     slow: bool = True
 
@@ -227,8 +222,7 @@ class Sampling:
     settled_starts: tuple[tuple[str, Flows], ...] = tuple((how, _FEW) for how in _STARTS)
     settled_sharp: float = 1.0  # share of the drift limit down to which a state goes on
     settled_loose: float = 1.0  # and the multiple of it up to which it counts
-    # parts of the time step with which a state is measured once more; 1: it isn't
-    settled_divisor: int = 2
+    settled_divisor: int = 2  # parts of the step with which it is measured again; 1: it isn't
 
     thresholds_width: float = 5e-5  # relative width of the last brackets
     thresholds_fold: float = 6e-4  # and of those about a fold
@@ -254,8 +248,7 @@ class Sampling:
     pulsation_steps: int = 512  # least number of time steps in a period
     pulsation_samples: int = 256  # in a period
     pulsation_divisor: int = 2  # parts of the time step in the last of successive runs
-    # largest amplitude tried, in units of what would end rolling in a slow pulsation
-    pulsation_reach: float = 1.1
+    pulsation_reach: float = 1.1  # largest amplitude, in units of what ends rolling in a slow one
     pulsation_width: float = 1e-3  # relative width to which the onset of slip is bracketed
     unloading_divisors: tuple[int, int] = (16, 32)  # of the coarse step, where the ball lands
 

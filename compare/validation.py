@@ -292,9 +292,8 @@ def write(
     known: Mapping[str, Verdict],
     over: Spread | None,
 ) -> list[Verdict]:
-    """Judge what isn't known yet, and write the summary, and the report if it is to be.
-
-    Return the verdicts on all claims."""
+    """Judge what isn't known yet; write the summary, and the report if there is a `map` for its
+    figures; return the verdicts on all claims."""
     verdicts = [known.get(claim.id) or full_verdict(claim, records) for claim in CLAIMS]
     summary = Summary.of(verdicts, level, files)
     if over:

@@ -80,8 +80,7 @@ class Campaign:
     doing : what the campaign is about
     label : what the names of new files begin with, see `reduce`
     save : writes the whole runs of a batch, by key, to a file
-    passing : whether `reduce` removes most: batches of less than `SOON_DONE` are then stored only
-        if memory is short"""
+    passing : whether `reduce` removes most: what is soon done is stored only if memory is short"""
 
     directory: Path
     workers: int | Workers = field(default_factory=lambda: os.cpu_count() or 1)

@@ -1,5 +1,4 @@
-"""Whether numba compiles now, here or in a worker: it may take a minute, for which nobody should
-wait without a word."""
+"""Whether numba compiles now, here or in a worker: nobody should wait a minute without a word."""
 
 from __future__ import annotations
 

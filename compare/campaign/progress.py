@@ -31,8 +31,7 @@ BY_THE_TABLE = 60.0
 LATE = 0.1
 """Share of its cost that a protocol still takes, at least, however long it has taken."""
 Show = Callable[[str, int, int, int], None]
-"""Called with what is being done, in words, how much of it is done, of how much in all, and how
-much failed."""
+"""Called with what is being done, how much of it is done, of how much, and how much failed."""
 
 
 def show_nothing(what: str, done: int, total: int, failed: int) -> None:
@@ -40,8 +39,7 @@ def show_nothing(what: str, done: int, total: int, failed: int) -> None:
 
 
 def part(tell: Callable[[float], object], begin: float, end: float) -> Callable[[float], object]:
-    """A function to be called with the fraction done of a part of a work, between two fractions of
-    the whole."""
+    """Tells the fraction done of a part of a work, between two fractions of the whole."""
     return lambda done: tell(begin + (end - begin) * done)
 
 
@@ -155,8 +153,7 @@ def reporter(quiet: bool = False, counted: bool = False) -> Iterator[Show]:
 class ValidationProgress:
     """How far a validation is: claims judged, protocols measured, runs of those under way.
 
-    What is shown as done is a share of time, so that who goes on at the pace of the whole until now
-    tells the time that is left."""
+    What is shown as done is a share of time, so that its pace tells the time that is left."""
 
     show: Show
     claims: int

@@ -143,8 +143,7 @@ class _Pool(ProcessPoolExecutor):
 def _without_signals() -> Iterator[None]:
     """A context in which signals that end a program wait, and whose new processes never get them.
 
-    Those that another thread gets are handled by the main one, blocked or not: they are sent again
-    afterwards."""
+    The main thread handles those that another gets, blocked or not: they are sent again."""
     if sys.platform == "win32":
         yield
         return
@@ -179,8 +178,7 @@ def _call_in_worker(fn: Callable[..., T], *args: Any, **kwargs: Any) -> T:
 
 
 def _follow_parent(end: Connection, told: Connection) -> None:
-    """In a worker: leave signals to the parent, tell it of compiling, and end with it, or when it
-    says so."""
+    """In a worker: leave signals to the parent, tell of compiling, end with it or at its word."""
 
     def wait_for_parent() -> None:
         end.poll(None)

@@ -144,8 +144,7 @@ class _Narrowing:
                 self.brackets[k] = replace(self.brackets[k], shift=self.before[k].width)
 
     def answers(self, asked: Sequence[tuple[int, float]], how: Attempt = USUAL) -> list[Reply]:
-        """Carry out a run for each question, the number of a search and a value; those without an
-        answer anew for longer."""
+        """Ask at values of searches, by number; those without an answer anew, for longer."""
         replies = []
         tasks = [self.searches[k].task(value, self.brackets[k], how) for k, value in asked]
         for (k, _), task, run in zip(asked, tasks, self.runner.each(tasks), strict=True):

@@ -22,8 +22,7 @@ class FluidConditions(TypedDict, total=False):
 
 
 class Conditions(FluidConditions, total=False):
-    """What a number depends on beside its parameters; those that its protocol doesn't name are
-    absent."""
+    """What a number depends on beside its parameters; what its protocol doesn't name is absent."""
 
     # a state, in the units of `model.kinematics`
     y: float

@@ -1,10 +1,8 @@
-"""What is measured: every quantity with its symbol, unit, and the resolution that is required of a
-check of it.
+"""What is measured: every quantity with its symbol, unit, and required resolution.
 
 A check has the resolution r if it would notice a prediction that is off by r times the quantity's
 scale, see `claim.Criterion`. A check with less than `Quantity.resolution` is inconclusive, however
-well the numbers agree. Required resolutions follow from the errors of each protocol at its quick
-level:
+well the numbers agree. That follows from the errors of each protocol at its quick level:
 
 * settled states don't depend on the time step: what is left is their drift, which is waited for
   down to 1e-8. A slip is a difference of spins ten times its size, a force one of accelerations;
@@ -27,9 +25,8 @@ level:
   unit of time; pulsations and jumps to a thousandth, to which the onset of slip is bracketed. Slip
   begins within a time step, a few hundredths of a period, near a maximum; the mean reading and the
   flow by which a ramp passes a fold are small differences of flows;
-* a contact rolls once friction can stop its slip within a step: at g h, 1/160 of sqrt(g R) at
-  quick;
-* rates and growths come from short records and carry the error of a time step, a few tenths of a
+* a contact rolls once friction can stop its slip within a step: at g h, 1/160 of sqrt(g R);
+* rates and growths come from short records, and a time step has an error of some tenths of a
   percent.
 
 Moved after results had been seen, with the reasons above found then: those of hops, four times in a

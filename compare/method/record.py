@@ -259,8 +259,7 @@ _PARAMETERS = tuple(f.name for f in dataclasses.fields(Parameters))
 def save(records: Records, path: Path, about: Mapping[str, Any]) -> None:
     """Write records, whole or not at all; `about` says whose they are (JSON-able, see `Origin`).
 
-    A condition or a cause of error that a row doesn't have is nan, or empty where it is text.
-    Raises `StorageError`."""
+    What a row doesn't have is nan, or empty where it is text. Raises `StorageError`."""
     rows = records.measurements
     columns: dict[str, Sequence[Any]] = {"row": range(len(rows))}
     columns |= {name: [getattr(m, name) for m in rows] for name in _OWN}
@@ -325,7 +324,6 @@ def load(path: Path, **origin: Any) -> Records:
         measurements = []
         for values in zip(*columns.values(), strict=True):
             row = dict(zip(columns, values, strict=True))
-            # what a row doesn't have is nan, or empty
             kept = {name: value for name, value in row.items() if value == value and value != ""}
             at = {n.removeprefix("at_"): kept[n] for n in conditions if n in kept}
             m = Measurement(

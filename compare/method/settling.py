@@ -189,10 +189,8 @@ def _judge_window(
 
 
 def _determined(case: Case) -> list[list[str]]:
-    """Of `ERROR_GROUPS` the quantities that are determined in a case.
-
-    Where both contacts roll only sums of forces are; nothing but the wall turns a ball about the
-    vertical."""
+    """Of `ERROR_GROUPS` the quantities that are determined in a case: where both contacts roll only
+    sums of forces are; nothing but the wall turns a ball about the vertical."""
     free = {"slip_y"} if case.B is Contact.N else set[str]()
     free |= set(FORCES) - set(SUMS) if case is Case.RR else set(SUMS) - set(FORCES)
     return [[q for q in group if q not in free] for group in ERROR_GROUPS]
@@ -201,8 +199,8 @@ def _determined(case: Case) -> list[list[str]]:
 def settle_finer(
     runner: Runner, states: Sequence[SteadyState], criteria: SettlingCriteria = SettlingCriteria()
 ) -> list[SteadyState]:
-    """The same states with the time step divided by `Sampling.settled_divisor`, each from its mean
-    and the height from which it started; as they are where that is one."""
+    """The same states with the time step divided by `Sampling.settled_divisor`, if that isn't one,
+    each from its mean and the height from which it started."""
     divisor = runner.sampling.settled_divisor
     if divisor == 1:
         return list(states)

@@ -83,9 +83,8 @@ def estimate(value: float, size: float = 1.0, **causes: float) -> Estimate:
 
 
 def plain(value: Any) -> Any:
-    """Nested data as JSON holds it: dataclasses as mappings, a case by name, complex as a pair.
-
-    Of numbers that are not finite None is left."""
+    """Nested data as JSON holds it: dataclasses as mappings, a case by name, complex as a pair, and
+    None for a number that isn't finite."""
     if is_dataclass(value):
         value = {each.name: getattr(value, each.name) for each in fields(value)}
     if isinstance(value, Mapping):
@@ -170,8 +169,8 @@ LEAST_RATIO, LARGEST_RATIO = 0.2, 0.9
 """Range of the ratio of the geometric series by which the changes of an estimate, point by point,
 are continued: two changes may be small by chance, and with a ratio near 1 the sum has no bound."""
 FAR = 10.0
-"""Largest distance of a maximum from the nearest point, divided by the length of the row of points:
-farther away the maximum is one of round-off."""
+"""Largest distance of a maximum from the nearest point, in lengths of the row of points: farther
+away it is one of round-off."""
 
 
 def slope_error(x: Array, degree: int) -> float:
@@ -180,10 +179,8 @@ def slope_error(x: Array, degree: int) -> float:
 
 
 def straight_line(x: npt.ArrayLike, points: Sequence[Estimate]) -> tuple[Estimate, Estimate]:
-    """Zero and slope of the line through points (n,) at x.
-
-    The uncertainties are those of the points carried over, and the scatter about the line where
-    that is larger."""
+    """Zero and slope of the line through points (n,) at x, uncertain by those of the points, or by
+    the scatter about the line where that is larger."""
     x, (y, noise) = np.asarray(x, dtype=float), _values(points)
     least = np.finfo(float).eps * np.abs(y).max()
     weight = np.maximum(noise, least) ** -2.0
@@ -302,10 +299,8 @@ def _real_roots(polynomial: Polynomial) -> list[float]:
 
 
 def propagator(record: Array, lag: int) -> Array:
-    """P (d, d) with record[k + lag] = P record[k] in least squares, of a record (n, d, d).
-
-    The columns of record[k] are d independent motions at sample k; rows should be scaled to be of
-    like size."""
+    """P (d, d) with record[k + lag] = P record[k] in least squares, of a record (n, d, d): columns
+    of record[k] are d independent motions at sample k, rows are scaled to be of like size."""
     now, later = record[:-lag], record[lag:]
     gram = np.einsum("nij,nkj->ik", now, now)
     return np.asarray(np.linalg.solve(gram, np.einsum("nij,nkj->ik", now, later)).T)

@@ -34,7 +34,7 @@ class Start:
 
 @dataclass(frozen=True, eq=False)
 class StepPair(Start):
-    """A motion that is run with two time steps, or with three; or with one, for no error."""
+    """A motion that is run with two time steps, or three; or with one, for no error."""
 
     t_end: float  # s
     divisors: tuple[int, ...]
@@ -215,11 +215,8 @@ def polynomials(
 
 
 def random_state(case: Case, p: Parameters, rng: np.random.Generator) -> Array:
-    """A state (8,) that satisfies the constraints of a case.
-
-    A ball that rolls goes round so slowly, or one that hangs on the wall so fast, that friction has
-    something to spare; a ball that the wall alone keeps from turning spins backwards about its
-    radial axis."""
+    """A state (8,) that satisfies the constraints of a case, in which friction has something to
+    spare; a ball that the wall alone keeps from turning spins backwards about its radial axis."""
     unit, speed = time_unit(p), math.sqrt(p.g * p.R)
     slips = rng.uniform(0.4, 1.0, 3) * rng.choice([-1, 1], 3) * speed / p.r
     omega_c = rng.uniform(0.4, 1.6) / unit

@@ -1,9 +1,8 @@
 """Statements of the paper that can be checked, and the verdicts on them.
 
-A claim says what is stated and where, and which measurements bear on it: a `Criterion` picks
-measurements by protocol, quantity and conditions, and predicts each by a function of `analytic`.
-The verdict is computed from the numbers. That the paper's text had to be corrected is another
-matter: `Claim.text`."""
+A `Criterion` picks measurements by protocol, quantity and conditions, and predicts each by a
+function of `analytic`. The verdict is computed from the numbers. That the paper's text had to be
+corrected is another matter: `Claim.text`."""
 
 from __future__ import annotations
 
@@ -155,9 +154,8 @@ class Judged:
 
     @property
     def resolving_power(self) -> dict[str, float]:
-        """By quantity, the smallest relative error that every conclusive check would notice.
-
-        That of all checks where none is conclusive."""
+        """By quantity, the smallest relative error that every conclusive check would notice; every
+        check where none is conclusive."""
         power: dict[str, float] = {}
         fine = {check.measurement.quantity for check in self.checks if check.conclusive}
         for check in self.checks:

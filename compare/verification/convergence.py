@@ -62,8 +62,7 @@ LEAST_STEPS = 3
 Ends = Set[tuple[str, float]]
 """Measured thresholds, each with the name of its set."""
 Alike = tuple[str, int, str, tuple[tuple[str, str], ...]]
-"""What checks of one thing with different steps share: protocol, criterion, set, and all
-conditions that are no numbers."""
+"""What checks of one thing share: protocol, criterion, set, and conditions that are no numbers."""
 Limit = tuple[Check, float]
 """A check in the zero-step limit, and the observed order, nan where the step shows nothing."""
 
@@ -224,9 +223,7 @@ def _polynomial_limit(steps: Array, errors: Array, own: Array, lowest: int) -> E
 def series_by_step(
     found: Mapping[int, Sequence[Check]], finest: Mapping[str, int]
 ) -> Iterator[StepSeries]:
-    """Each check with its protocol's finest step, and those with coarser ones.
-
-    By step divisor; `finest` is that of each protocol."""
+    """Each check, by step divisor, with its protocol's `finest`, and those with coarser steps."""
     groups: dict[Alike, dict[int, list[Check]]] = {}
     for divisor in sorted(found):
         for check in found[divisor]:

@@ -39,8 +39,7 @@ def theory(function: Callable[P, R], *args: P.args, **options: P.kwargs) -> R:
 
     Name the function through its module where it is called, as in ``theory(pulsation.slip_onset, p,
     f)``: then a theory that was exchanged is the one that is asked."""
-    # they can be hashed
-    result: R = _computed(function, *args, **options)  # type: ignore[arg-type]
+    result: R = _computed(function, *args, **options)  # type: ignore[arg-type]  # are hashable
     return result
 
 
@@ -77,9 +76,8 @@ def verdict(claim: Claim, records: Records) -> Verdict:
     carried out; else inconclusive if of a criterion too few checks are fine enough to tell, see
     `ENOUGH`; else not run if the claim predicts numbers and has none, since counts confirm no
     number; else inconclusive if planned numbers are lost without a reason that their protocol gave;
-    else confirmed. A check that is too coarse confirms nothing,
-    and is counted apart. Whatever a prediction raises makes the verdict an error of this claim
-    alone."""
+    else confirmed. A check that is too coarse confirms nothing, and is counted apart. Whatever a
+    prediction raises makes the verdict an error of this claim alone."""
     absent, lost = not_carried_out(claim, records), lost_to(claim, records)
     left_out = (each for each in records.missing if each.protocol in claim.protocols)
     missing = (*absent, *counted([*lost, *left_out]))
@@ -132,8 +130,7 @@ def lost_to(claim: Claim, records: Records) -> tuple[Missing, ...]:
 
 
 def not_carried_out(claim: Claim, records: Records) -> tuple[Missing, ...]:
-    """The protocols of a claim of which there is nothing at all, though they are planned from its
-    level on."""
+    """The protocols of a claim of which there is nothing, though they are planned at its level."""
     done = {row.protocol for row in (*records.rows, *records.planned)}
     return tuple(
         Missing(name, "all sets", f"protocol {name} was not carried out")
