@@ -29,8 +29,7 @@ __all__ = [*_MODULES]
 
 def __getattr__(name: str) -> Any:
     """A name when it is asked for: the help of a command needs no arrays."""
-    if name in _MODULES:
-        return globals().setdefault(
-            name, getattr(importlib.import_module(f"model.{_MODULES[name]}"), name)
-        )
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module = importlib.import_module(f"model.{_MODULES[name]}")
+    return globals().setdefault(name, getattr(module, name))

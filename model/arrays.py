@@ -8,5 +8,6 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
 Real = Any
 """A float, or an array of any shape: for formulas that take both."""

@@ -85,9 +85,8 @@ class Flow:
     def staircase(cls, levels: Sequence[float], hold: float) -> Self:
         """Each level in turn held for `hold` seconds, the last one from then on."""
         check_number("hold", hold, "s", POSITIVE)
-        return cls._from_pieces(
-            "staircase", [hold * k for k in range(len(levels))], levels, [0.0] * len(levels)
-        )
+        starts = [hold * k for k in range(len(levels))]
+        return cls._from_pieces("staircase", starts, levels, [0.0] * len(levels))
 
     @classmethod
     def sampled(
@@ -95,9 +94,8 @@ class Flow:
     ) -> Self:
         """Linear interpolation between samples, held at both ends; times must increase."""
         if len(times) != len(omega_0):
-            raise InputError(
-                f"a sampled flow has {len(times)} times but {len(omega_0)} values of omega_0"
-            )
+            counts = f"{len(times)} times but {len(omega_0)} values of omega_0"
+            raise InputError(f"a sampled flow has {counts}")
         level = cls._from_pieces(kind, times, omega_0, [0.0] * len(times))
         return replace(level, slope=np.append(np.diff(level.value) / np.diff(level.start), 0.0))
 
@@ -146,15 +144,13 @@ class Flow:
         if len(times) > 1:
             intervals = np.diff(times)
             usual = float(np.median(intervals))
-            if longest_interval is None:
-                longest_interval = GAP * usual
-            for k in np.flatnonzero(
-                intervals > check_number("longest_interval", longest_interval, "s", POSITIVE)
-            )[:1]:
+            longest = GAP * usual if longest_interval is None else longest_interval
+            check_number("longest_interval", longest, "s", POSITIVE)
+            for k in np.flatnonzero(intervals > longest)[:1]:
                 raise InputError(
                     f"{path}, line {lines[k + 1]}: a gap of {intervals[k]:g} s from t = "
-                    f"{times[k]:g} s on; usual are "
-                    f"{usual:g} s, and longest_interval = {longest_interval:g} s"
+                    f"{times[k]:g} s on; usual are {usual:g} s, and longest_interval = "
+                    f"{longest:g} s"
                 )
         return cls.sampled(times, values, kind="measured")
 
@@ -163,43 +159,31 @@ class Flow:
         cls, kind: str, start: Iterable[float], value: Iterable[float], slope: Iterable[float]
     ) -> Self:
         """A flow that is linear from each start on; `InputError` for wrong values or times."""
-        t = [
-            check_number(f"time of flow sample {k}", time, "s", REACH)
-            for k, time in enumerate(start)
-        ]
-        v = [
-            check_number(f"omega_0 of flow sample {k}", omega, "rad s-1", REACH)
-            for k, omega in enumerate(value)
-        ]
+        at = "of flow sample"
+        t = [check_number(f"time {at} {k}", each, "s", REACH) for k, each in enumerate(start)]
+        v = [check_number(f"omega_0 {at} {k}", w, "rad s-1", REACH) for k, w in enumerate(value)]
         if not v:
             raise InputError("a flow needs at least one value of omega_0")
-        if np.any(np.diff(t) <= 0):
-            k = int(np.argmax(np.diff(t) <= 0))
-            raise InputError(
-                f"flow times must increase, but sample {k + 1} is at {t[k + 1]:g} s after "
-                f"{t[k]:g} s"
-            )
+        for k in np.flatnonzero(np.diff(t) <= 0)[:1]:
+            after = f"sample {k + 1} is at {t[k + 1]:g} s after {t[k]:g} s"
+            raise InputError(f"flow times must increase, but {after}")
         return cls(kind, np.array(t), np.array(v), np.array(list(slope), dtype=float))
 
     def to_mapping(self) -> dict[str, Any]:
         """A JSON-able description, exact."""
-        pieces = {
-            name: getattr(self, name).tolist() for name in ("start", "value", "slope", "waves")
-        }
-        return {"kind": self.kind} | pieces
+        names = ("start", "value", "slope", "waves")
+        return {"kind": self.kind} | {name: getattr(self, name).tolist() for name in names}
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> Self:
         """Inverse of `to_mapping`; raises `InputError` if it isn't one."""
         try:
-            flow = cls._from_pieces(
-                str(values["kind"]), values["start"], values["value"], values["slope"]
-            )
+            pieces = (values[name] for name in ("start", "value", "slope"))
+            flow = cls._from_pieces(str(values["kind"]), *pieces)
             flow = replace(flow, waves=cls.sines(0.0, values["waves"]).waves)
         except (KeyError, TypeError, ValueError) as error:
             raise InputError(f"not a flow: {error}") from error
-        if not flow.start.shape == flow.value.shape == flow.slope.shape or not np.all(
-            np.isfinite(flow.slope)
-        ):
+        alike = flow.start.shape == flow.value.shape == flow.slope.shape
+        if not alike or not np.all(np.isfinite(flow.slope)):
             raise InputError("not a flow: start, value and slope must be finite and of one length")
         return flow

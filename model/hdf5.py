@@ -61,9 +61,8 @@ def reading(path: str | Path, ours: bool = True) -> Iterator[h5py.File]:
         if not content.startswith(_SIGNATURE):
             raise StorageError("it is not an HDF5 file")
         if ours and content[-_TRAILER:-64] != _SEAL:
-            raise StorageError(
-                "it is cut short, changed, or not of this program (no checksum at its end)"
-            )
+            why = "cut short, changed, or not of this program (no checksum at its end)"
+            raise StorageError(f"it is {why}")
         if ours and content != sealed(content[:-_TRAILER]):
             raise StorageError("it is damaged (its content does not match its checksum)")
         with h5py.File(path, "r") as file:
@@ -102,11 +101,11 @@ def write_columns(
     """Write columns of numbers or text; the first, `scales`, are the scales of the others."""
     written: dict[str, h5py.Dataset] = {}
     for name, values in columns.items():
-        is_text = np.size(values) and isinstance(np.ravel(values)[0], str)
-        text = h5py.string_dtype() if is_text else None
-        written[name] = file.create_dataset(
-            name, data=np.asarray(values, object) if text else values, dtype=text
-        )
+        if np.size(values) and isinstance(np.ravel(values)[0], str):
+            text, kind = np.asarray(values, object), h5py.string_dtype()
+            written[name] = file.create_dataset(name, data=text, dtype=kind)
+        else:
+            written[name] = file.create_dataset(name, data=values)
         if name in scales:
             written[name].make_scale(name)
         else:

@@ -82,10 +82,9 @@ def state_units(p: Parameters) -> Array:
 
 def check_place(x: State, p: Parameters, depth: float = 0.0) -> None:
     """`InputError` for a ball deeper in floor or wall than `depth`, m, or on the axis."""
+    inside = Range(0.0 - depth, p.R, below=True)
     check_number("y", x.y, "m", Range(0.0 - depth), "to be above the floor it")
-    check_number(
-        "h", x.h, "m", Range(0.0 - depth, p.R, below=True), "to be between wall and axis it"
-    )
+    check_number("h", x.h, "m", inside, "to be between wall and axis it")
 
 
 class Motion(NamedTuple):
@@ -181,9 +180,8 @@ def from_world(motion: Motion, p: Parameters) -> tuple[State, Array]:
     with np.errstate(invalid="ignore", divide="ignore"):
         omega_c = np.where(rho > 0, v_k / rho, np.nan)
     # v_k is rho omega_c: the rolling part needs no division by rho.
-    return State(
-        pz - p.r, v_y, omega_c, o_x - v_k / p.r, o_y + v_k / p.r, o_z - v_y / p.r, p.R - rho, v_h
-    ), theta
+    slips = o_x - v_k / p.r, o_y + v_k / p.r, o_z - v_y / p.r
+    return State(pz - p.r, v_y, omega_c, *slips, p.R - rho, v_h), theta
 
 
 def _matrix_product(matrix: Array, vector: Array) -> Array:

@@ -44,9 +44,8 @@ class Range:
     def __str__(self) -> str:
         """As a person reads it: ``> 0 and <= 2/3``."""
         ends = ((">" if self.open else ">=", self.low), ("<" if self.below else "<=", self.high))
-        limits = " and ".join(
-            f"{sign} {_exact_text(end)}" for sign, end in ends if math.isfinite(end)
-        )
+        finite = (f"{sign} {_exact_text(end)}" for sign, end in ends if math.isfinite(end))
+        limits = " and ".join(finite)
         return f"{'a whole number' * self.whole} {limits}".strip() or "any"
 
 
@@ -68,16 +67,14 @@ def check_number(
             raise TypeError
         number = float(value)
     except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(
-            f"{name} = {value!r} must be a number{f' in {unit}' * (unit != '1')}"
-        ) from error
+        of = f" in {unit}" * (unit != "1")
+        raise InputError(f"{name} = {value!r} must be a number{of}") from error
     of = f" {unit}" * (unit != "1")
     if not math.isfinite(number):
         raise InputError(f"{name} = {number}{of} must be finite")
     if number not in allowed:
-        raise InputError(
-            f"{name} = {number:g}{of} is out of range: {f'{meaning} must'.strip()} be {allowed}"
-        )
+        must = f"{meaning} must".strip()
+        raise InputError(f"{name} = {number:g}{of} is out of range: {must} be {allowed}")
     return number
 
 
@@ -93,9 +90,8 @@ def check_choice(name: str, value: Any, known: Sequence[Any]) -> None:
     """`InputError` if `value` is none of the known ones."""
     if value not in known:
         names = [str(each) for each in known]
-        raise InputError(
-            f"{name} = {value!r} must be one of {', '.join(names)}{suggestion(str(value), names)}"
-        )
+        one = f"{', '.join(names)}{suggestion(str(value), names)}"
+        raise InputError(f"{name} = {value!r} must be one of {one}")
 
 
 def check_names(
@@ -104,21 +100,16 @@ def check_names(
     """`InputError` if a given name is none of the known ones, or a needed one is not given."""
     for name in given:
         if name not in known:
-            raise InputError(
-                f"unknown {kind} {name!r}{suggestion(name, known)}; known: {few(known, MOST_NAMES)}"
-            )
+            known_ones = f"{suggestion(name, known)}; known: {few(known, MOST_NAMES)}"
+            raise InputError(f"unknown {kind} {name!r}{known_ones}")
     if missing := [name for name in needed if name not in given]:
         raise InputError(f"missing {kind} {few(map(repr, missing), MOST_NAMES)}")
 
 
 def _exact_text(number: float) -> str:
     """A number as text, short and exact where that can be: 0.1, 2/3."""
-    fraction = Fraction(number).limit_denominator(9)
-    return (
-        f"{number:g}"
-        if float(f"{number:g}") == number or float(fraction) != number
-        else str(fraction)
-    )
+    short, fraction = f"{number:g}", Fraction(number).limit_denominator(9)
+    return short if float(short) == number or float(fraction) != number else str(fraction)
 
 
 def _quantity(symbol: str, unit: str, meaning: str, allowed: Range, **default: Any) -> Any:
@@ -186,9 +177,8 @@ class Parameters:
             object.__setattr__(self, field.name, value + 0.0)  # without the sign of -0
         check_choice("drag", self.drag, laws.LAWS)
         if self.drag != laws.STOKES and self.nu_f == 0:
-            raise InputError(
-                f"drag = {self.drag!r} needs the Reynolds number: nu_f in m2 s-1 must be given"
-            )
+            needs = "needs the Reynolds number: nu_f in m2 s-1 must be given"
+            raise InputError(f"drag = {self.drag!r} {needs}")
 
     @classmethod
     @functools.cache
@@ -231,27 +221,15 @@ class Parameters:
         rho_f, rho_b : densities of fluid and ball, kg m-3; the ball must be the denser
         gravity : gravitational acceleration in vacuum, m s-2
         r, j, rest : R, mu, eta and omega_0 (0 if not given), drag and C_D, as in `Parameters`"""
-        given = {
-            "nu_f": (nu_f, "m2 s-1"),
-            "rho_f": (rho_f, "kg m-3"),
-            "r": (r, "m"),
-            "gravity": (gravity, "m s-2"),
-        }
-        for name, (value, unit) in given.items():
-            check_number(name, value, unit, POSITIVE)
-            check_number(name, value, unit, SIZES)
-        check_number(
-            "rho_b",
-            rho_b,
-            "kg m-3",
-            Range(rho_f, open=True),
-            "a ball not denser than the fluid floats; it",
-        )
+        given = ("nu_f", nu_f, "m2 s-1"), ("rho_f", rho_f, "kg m-3")
+        for each in (*given, ("r", r, "m"), ("gravity", gravity, "m s-2")):
+            check_number(*each, POSITIVE)
+            check_number(*each, SIZES)
+        floats = "a ball not denser than the fluid floats; it"
+        check_number("rho_b", rho_b, "kg m-3", Range(rho_f, open=True), floats)
         m, c = 4 / 3 * math.pi * r**3 * rho_b, 9 * nu_f / (2 * r**2) * rho_f / rho_b
-        fluid = {"nu_f": nu_f, "density_ratio": rho_f / rho_b}
-        return cls(
-            m=m, r=r, j=j, g=gravity * (1 - rho_f / rho_b), c=c, **{"omega_0": 0.0} | rest | fluid
-        )
+        g, fluid = gravity * (1 - rho_f / rho_b), {"nu_f": nu_f, "density_ratio": rho_f / rho_b}
+        return cls(m=m, r=r, j=j, g=g, c=c, **{"omega_0": 0.0} | rest | fluid)
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> Self:
@@ -262,8 +240,8 @@ class Parameters:
         missing or contradictory key."""
         names = [f.name for f in dataclasses.fields(cls)]
         if "fluid" not in values:
-            needed = (f.name for f in dataclasses.fields(cls) if f.default is dataclasses.MISSING)
-            check_names(values, [*names, "fluid"], "parameter", needed)
+            required = (f.name for f in dataclasses.fields(cls) if f.default is dataclasses.MISSING)
+            check_names(values, [*names, "fluid"], "parameter", required)
             return cls(**values)
         fluid = values["fluid"]
         if not isinstance(fluid, Mapping):
@@ -271,16 +249,11 @@ class Parameters:
         rest = {k: v for k, v in values.items() if k != "fluid"}
         for name in ("m", "g", "c", "nu_f", "density_ratio"):
             if name in rest:
-                raise InputError(
-                    f"{name} follows from the [fluid] table and may not be given beside it"
-                )
+                where = "from the [fluid] table and may not be given beside it"
+                raise InputError(f"{name} follows {where}")
         check_names(rest, names, "parameter", ("r", "R", "mu", "eta"))
-        check_names(
-            fluid,
-            ("nu_f", "rho_f", "rho_b", "gravity"),
-            "fluid property",
-            ("nu_f", "rho_f", "rho_b"),
-        )
+        needed = ("nu_f", "rho_f", "rho_b")
+        check_names(fluid, (*needed, "gravity"), "fluid property", needed)
         return cls.from_fluid(**rest, **fluid)
 
     @classmethod

@@ -27,6 +27,7 @@ from model.trajectory import (
     FLUID,
     Events,
     Header,
+    Tabular,
     Trajectory,
     attributes,
     columns,
@@ -72,15 +73,13 @@ def save_batch(runs: Mapping[str, Trajectory], path: str | Path) -> None:
     is JSON in `header` (run)."""
     with writing(path) as file:
         scales = _write_common(file, BATCH, BATCH_VERSION)
-        file.attrs.update(
-            Conventions=CONVENTIONS, title=f"Motions of dual-point contact balls: {len(runs)} runs"
-        )
+        title = f"Motions of dual-point contact balls: {len(runs)} runs"
+        file.attrs.update(Conventions=CONVENTIONS, title=title)
         file.attrs["versions"] = json.dumps(dict(current_versions()))
         scales["run"] = file.create_dataset("run", data=list(runs), dtype=_TEXT)
         scales["run"].make_scale("run")
-        headers = [
-            json.dumps(run.header.attributes() | {"mjcf": run.header.mjcf}) for run in runs.values()
-        ]
+        abouts = (run.header for run in runs.values())
+        headers = [json.dumps(each.attributes() | {"mjcf": each.mjcf}) for each in abouts]
         file.create_dataset("header", data=headers, dtype=_TEXT).dims[0].attach_scale(scales["run"])
         for dimension, of in (("sample", Trajectory), ("event", Events)):
             tables: list[Any] = [run.events if of is Events else run for run in runs.values()]
@@ -109,9 +108,8 @@ def load(path: str | Path) -> Trajectory:
     try:
         return load_runs(path.parent)[path.name]
     except KeyError as error:
-        raise StorageError(
-            f"cannot read {path}: {path.parent} holds no run of that name"
-        ) from error
+        none = f"{path.parent} holds no run of that name"
+        raise StorageError(f"cannot read {path}: {none}") from error
 
 
 def contents(path: str | Path) -> tuple[str, list[str]]:
@@ -156,7 +154,7 @@ def _write_common(file: h5py.File, schema: str, version: int) -> dict[str, h5py.
     return {"axis": axis}
 
 
-def _stored_columns(of: type[Trajectory] | type[Events]) -> dict[str, Mapping[str, Any]]:
+def _stored_columns(of: Tabular) -> dict[str, Mapping[str, Any]]:
     """The columns of a table, with the flow, which isn't read back."""
     return columns(of) | ({"omega_0": FLUID} if of is Trajectory else {})
 
@@ -208,13 +206,9 @@ def _trajectory(
     events: Mapping[str, npt.NDArray[Any]],
 ) -> Trajectory:
     """A run from the texts of its header and its columns."""
-    values = {
-        field.name: _attribute(texts, field.name, str) for field in dataclasses.fields(Header)
-    }
-    values |= {
-        name: _attribute(texts, name, dict)
-        for name in ("parameters", "flow", "settings", "versions")
-    }
+    tables = ("parameters", "flow", "settings", "versions")
+    values = {f.name: _attribute(texts, f.name, str) for f in dataclasses.fields(Header)}
+    values |= {name: _attribute(texts, name, dict) for name in tables}
     values["parameters"] = Parameters.from_mapping(values["parameters"])
     values["flow"] = Flow.from_mapping(values["flow"])
     codes = np.concatenate([samples["case"], events["from_case"], events["to_case"]])
@@ -239,17 +233,12 @@ def _attribute(texts: Mapping[str, Any], name: str, kind: type) -> Any:
     return value
 
 
-def _table(
-    file: h5py.File, of: type[Trajectory] | type[Events], leading: int
-) -> dict[str, npt.NDArray[Any]]:
+def _table(file: h5py.File, of: Tabular, leading: int) -> dict[str, npt.NDArray[Any]]:
     """Read and check all columns of a table of `leading` dimensions before those of one entry."""
     values = {}
     for column, meta in columns(of).items():
-        name, stored = meta["name"], dataset(file, meta["name"])
-        if (
-            len(stored.shape or ()) != leading + len(meta["shape"])
-            or stored.shape[leading:] != meta["shape"]
-        ):
+        name, stored, shape = meta["name"], dataset(file, meta["name"]), meta["shape"]
+        if len(stored.shape or ()) != leading + len(shape) or stored.shape[leading:] != shape:
             raise StorageError(f"{name!r} has shape {stored.shape}")
         if stored.dtype.kind != np.dtype(meta["dtype"]).kind:
             raise StorageError(f"{name!r} has type {stored.dtype}")

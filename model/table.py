@@ -45,9 +45,8 @@ def is_number(text: str) -> bool:
 def check_unit(label: str, name: str, given: str, unit: str) -> None:
     """`InputError` for values in another unit than that of the quantity: nothing is converted."""
     if _factors(given) != _factors(unit):
-        raise InputError(
-            f"{label!r}: {name} must be in {unit.replace(' s-1', '/s')}, not in {given}"
-        )
+        wanted = unit.replace(" s-1", "/s")
+        raise InputError(f"{label!r}: {name} must be in {wanted}, not in {given}")
 
 
 def _factors(unit: str) -> list[str]:
@@ -68,10 +67,8 @@ def columns(
     for k, label in enumerate(head):
         match = _LABEL.fullmatch(label.strip())
         assert match
-        name = next(
-            (name for name, (_, others) in known.items() if match["name"] in (name, *others)), None
-        )
-        if name is None:
+        called = (name for name, (_, others) in known.items() if match["name"] in (name, *others))
+        if (name := next(called, None)) is None:
             continue
         if given := match["unit"] or match["after"]:
             check_unit(label.strip(), name, given, known[name][0])
@@ -80,10 +77,8 @@ def columns(
         found[name] = k
     for name in needed:
         if name not in found:
-            said = ", ".join(repr(label.strip()) for label in head)
-            raise InputError(
-                f"no column is called {name}{suggestion(name, head)}; there are {said}"
-            )
+            there = f"there are {', '.join(repr(label.strip()) for label in head)}"
+            raise InputError(f"no column is called {name}{suggestion(name, head)}; {there}")
     return found
 
 

@@ -59,6 +59,5 @@ def check_timestep(
     if timestep > shortest / 2:
         raise InputError(
             f"timestep = {timestep:g} s is out of range: must be <= {shortest / 2:.3g} s, half of "
-            f"{name}, "
-            "the shortest time of the problem"
+            f"{name}, the shortest time of the problem"
         )

@@ -46,10 +46,8 @@ def _column(
 
 MOST_SAMPLES = 2e6
 """Of a run, which is held in memory until it is written: some kilobyte each."""
-FLUID: Mapping[str, Any] = {
-    "name": "omega_0",
-    **_column("rad s-1", "angular velocity of the fluid").metadata,
-}
+_fluid = _column("rad s-1", "angular velocity of the fluid").metadata
+FLUID: Mapping[str, Any] = {"name": "omega_0", **_fluid}
 """The column of a file that follows from the flow, and isn't read back."""
 
 
@@ -76,9 +74,8 @@ class Header:
 
     def attributes(self) -> dict[str, Any]:
         """What a file says of itself: each parameter, and all but the MJCF as text or JSON."""
-        texts = {
-            f.name: getattr(self, f.name) for f in dataclasses.fields(self) if f.name != "mjcf"
-        }
+        texts = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        del texts["mjcf"]
         parameters = dataclasses.asdict(self.parameters)
         mappings = {"parameters": parameters, "flow": self.flow.to_mapping()}
         mappings |= {name: dict(texts[name]) for name in ("settings", "versions")}
@@ -146,10 +143,8 @@ class Trajectory:
         """The cases in order, with the times of the first and last sample in each, s."""
         starts = np.flatnonzero(np.diff(self.case, prepend=-1))
         ends = np.append(starts, len(self.case))[1:] - 1
-        stretches = zip(
-            self.case[starts], self.time[starts].tolist(), self.time[ends].tolist(), strict=True
-        )
-        return [(Case(code), first, last) for code, first, last in stretches]
+        cases, times = map(Case, self.case[starts]), self.time.tolist()
+        return [(case, times[a], times[b]) for case, a, b in zip(cases, starts, ends, strict=True)]
 
     @property
     def complete(self) -> bool:
@@ -224,7 +219,10 @@ class Events:
         return len(self.time)
 
 
-def columns(of: type[Trajectory] | type[Events]) -> dict[str, Mapping[str, Any]]:
+Tabular = type[Trajectory] | type[Events]
+
+
+def columns(of: Tabular) -> dict[str, Mapping[str, Any]]:
     """Metadata of columns, in order: name in a file, units, long_name, equation, shape, dtype."""
     table = "event_" if of is Events else ""
     fields = [f for f in dataclasses.fields(of) if "units" in f.metadata]

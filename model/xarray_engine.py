@@ -30,17 +30,12 @@ class RunBackend(BackendEntrypoint):
         from model import storage  # here, because xarray loads this module whatever it is to open
 
         if not isinstance(filename_or_obj, str | os.PathLike):
-            raise InputError(
-                f"engine='dualball' opens a file by its name, not a "
-                f"{type(filename_or_obj).__name__}"
-            )
+            kind = type(filename_or_obj).__name__
+            raise InputError(f"engine='dualball' opens a file by its name, not a {kind}")
         run, about = storage.load(Path(filename_or_obj)), columns(Trajectory)
-        metas = {name: about[column] for name, (column, _) in COMPONENTS.items()} | {
-            "omega_0": FLUID
-        }
-        found = {
-            name: ("time", values, attributes(metas[name])) for name, values in run.table().items()
-        }
+        metas = {name: about[column] for name, (column, _) in COMPONENTS.items()}
+        metas["omega_0"], table = FLUID, run.table().items()
+        found = {name: ("time", values, attributes(metas[name])) for name, values in table}
         names = [case.name for case in run.cases]
         found["case"] = "time", np.array(names), {"long_name": about["case"]["long_name"]}
         whole = xarray.Dataset(found, attrs=run.header.attributes())

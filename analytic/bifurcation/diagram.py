@@ -39,10 +39,8 @@ def thresholds(p: Parameters) -> Thresholds:
     check_type("p", p, Parameters)
     Omega = threshold_curves(p, p.mu, p.eta)
     unit = np.sqrt(p.g / p.R)
-    omega = {
-        name: float(Omega[name] * unit) for name in ("omega_01", "omega_02", "omega_03", "omega_04")
-    }
-    return Thresholds(**omega, eta_cr=float(Omega["eta_cr"]))
+    eta_cr = float(Omega.pop("eta_cr"))
+    return Thresholds(**{name: float(flow * unit) for name, flow in Omega.items()}, eta_cr=eta_cr)
 
 
 def threshold_curves(
@@ -84,9 +82,8 @@ def number_of_folds(p: Parameters) -> int:
     By the changes of sign of `slope`, a search that assumes nothing. `InputError` as
     `check_branch`."""
     check_branch(p)
-    values = slipping_branch.slope(
-        np.linspace(-slipping_branch.END, slipping_branch.END, 20_001), p
-    )
+    places = np.linspace(-slipping_branch.END, slipping_branch.END, 20_001)
+    values = slipping_branch.slope(places, p)
     return int(np.sum(np.sign(values[1:]) != np.sign(values[:-1])))
 
 
@@ -106,8 +103,7 @@ def check_branch(p: Parameters) -> None:
     if not (0 < p.eta < p.j and p.mu > 0 and p.c > 0):
         raise InputError(
             f"eta = {p.eta:g} is out of range: SS has a branch from RR to SR for 0 < eta < j = "
-            f"{p.j:g}, mu > 0, "
-            "c > 0 only"
+            f"{p.j:g}, mu > 0, c > 0 only"
         )
 
 
@@ -216,11 +212,7 @@ def inertia_shifts(p: Parameters) -> dict[str, float]:
 
     And of c/(1 + 2j), the rate of RR in (23), which added mass makes c/(1 + 2j + s/2) whatever the
     law of drag."""
-    before, after = thresholds(p), thresholds_with_inertia(p)
-    changes = {
-        name: after[name] / getattr(before, name) - 1
-        for name in SHIFTED
-        if getattr(before, name) != 0
-    }
+    before, after = vars(thresholds(p)), thresholds_with_inertia(p)
+    changes = {name: after[name] / before[name] - 1 for name in SHIFTED if before[name] != 0}
     rolling = 1 + 2 * p.j
     return changes | {"rolling_rate": rolling / (rolling + p.density_ratio / 2) - 1}

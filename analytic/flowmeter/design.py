@@ -29,6 +29,7 @@ from model.arrays import Array
 
 Make: TypeAlias = Callable[..., Parameters]
 """Parameters of a meter from values by name."""
+Values: TypeAlias = Mapping[str, float]
 Interval: TypeAlias = tuple[float, float]
 """Lowest and highest value."""
 
@@ -52,7 +53,7 @@ class Sensitivity:
     """Estimated from differences of two widths."""
 
 
-def sensitivities(make: Make, at: Mapping[str, float]) -> dict[str, dict[str, Sensitivity]]:
+def sensitivities(make: Make, at: Values) -> dict[str, dict[str, Sensitivity]]:
     """Sensitivity of each threshold to each of the values `at`.
 
     By central differences in the logarithm, extrapolated from two widths (Richardson). omega_01 to
@@ -80,17 +81,14 @@ def sensitivities(make: Make, at: Mapping[str, float]) -> dict[str, dict[str, Se
     return found
 
 
-def corners(
-    make: Make, at: Mapping[str, float], tolerances: Mapping[str, float]
-) -> Iterator[Parameters]:
+def corners(make: Make, at: Values, tolerances: Values) -> Iterator[Parameters]:
     """The meter with every value at an end of its relative tolerance: x (1 - t) or x (1 + t).
 
     Limits and readings are monotonic in friction and size, but for a ridge of the operating limit
     at eta = j; so their extremes over all that the tolerances allow are at corners. A test samples
     between them."""
-    inexact = {
-        name: (at[name] * (1 - t), at[name] * (1 + t)) for name, t in tolerances.items() if t > 0
-    }
+    wide = {name: t for name, t in tolerances.items() if t > 0}
+    inexact = {name: (at[name] * (1 - t), at[name] * (1 + t)) for name, t in wide.items()}
     for values in itertools.product(*inexact.values()):
         yield make(**{**at, **dict(zip(inexact, values, strict=True))})
 
@@ -113,10 +111,9 @@ def readings(p: Parameters, omega_0: npt.ArrayLike) -> tuple[Array, Array]:
         return flows, flows
     t, turn, unit = bifurcation.thresholds(p), slipping_branch.fold(p), np.sqrt(p.g / p.R)
     end, ends_in_fold = (slipping_branch.END, False) if np.isnan(turn) else (float(turn), True)
-    s = roots.sign_change(
-        lambda s: slipping_branch.branch(s, p).Omega_0 * unit - flows, -slipping_branch.END, end
-    )
-    lagging = np.where(np.isnan(s), flows, slipping_branch.branch(s, p).Omega_c * unit)
+    branch = partial(slipping_branch.branch, p=p)
+    s = roots.sign_change(lambda s: branch(s).Omega_0 * unit - flows, -slipping_branch.END, end)
+    lagging = np.where(np.isnan(s), flows, branch(s).Omega_c * unit)
     slips = (flows > t.omega_01) & ~(flows > (t.omega_04 if ends_in_fold else t.omega_02))
     return np.where(slips, lagging, flows), np.where(slips & ~(flows > t.omega_02), lagging, flows)
 
@@ -145,9 +142,7 @@ class Choice:
     """Time constant, s."""
 
 
-def choice(
-    make: Make, values: Mapping[str, float], tolerances: Mapping[str, float], fastest: float
-) -> Choice:
+def choice(make: Make, values: Values, tolerances: Values, fastest: float) -> Choice:
     """Limits, margin and response of a meter for flows up to `fastest`, rad s-1."""
     p = make(**values)
     limit = flowmeter.operating_limit(p)
@@ -159,7 +154,7 @@ def choice(
 def best(
     make: Make,
     bounds: Mapping[str, Interval],
-    tolerances: Mapping[str, float],
+    tolerances: Values,
     fastest: float,
     slowest_response: float = math.inf,
     seed: int = 0,
@@ -212,8 +207,7 @@ def best(
     if chosen.response > slowest_response:
         raise InputError(
             f"response = {slowest_response:g} s excludes everything: within the bounds the "
-            f"quickest ball has a time "
-            f"constant of {chosen.response:.3g} s"
+            f"quickest ball has a time constant of {chosen.response:.3g} s"
         )
     return chosen
 
@@ -229,7 +223,7 @@ class Request:
     fastest: float
     bounds: Mapping[str, Mapping[str, Interval]]
     """For each material the bounds on r, R, rho_b, mu, eta and j."""
-    tolerances: Mapping[str, float]
+    tolerances: Values
     """Relative, of any of `INEXACT`."""
     response: float = math.inf
     """Longest time constant, s."""

@@ -20,7 +20,7 @@ from analytic.simulation.settings import Settings
 from analytic.simulation.simulator import simulate
 from analytic.slipping import slip_bounds
 from model import Case, Flow, Parameters, SimulationError, State
-from model.arrays import Array
+from model.arrays import Array, Complex
 from model.drag import STOKES
 from model.kinematics import TURNING
 
@@ -42,14 +42,11 @@ def swing(
     p: Parameters, amplitude: float, frequency: float, phase: npt.ArrayLike
 ) -> tuple[Array, Array]:
     """omega_c and omega_0 of RR in a pulsation, rad s-1, at phases of the flow, rad, same shape."""
-    return _swing(
-        p, amplitude, lag_harmonics(p, amplitude, frequency), np.asarray(phase, dtype=float)
-    )
+    lag = lag_harmonics(p, amplitude, frequency)
+    return _swing(p, amplitude, lag, np.asarray(phase, dtype=float))
 
 
-def _swing(
-    p: Parameters, amplitude: float, lag: npt.NDArray[np.complex128], phase: Array
-) -> tuple[Array, Array]:
+def _swing(p: Parameters, amplitude: float, lag: Complex, phase: Array) -> tuple[Array, Array]:
     """As `swing`, from the harmonics of the lag."""
     omega_0 = p.omega_0 + amplitude * np.sin(phase)
     waves = np.exp(1j * phase[..., None] * np.arange(1, 2 * len(lag), 2))
@@ -63,7 +60,7 @@ def first_harmonic(p: Parameters, amplitude: float, frequency: float) -> complex
 
 def lag_harmonics(
     p: Parameters, amplitude: float, frequency: float, harmonics: int = HARMONICS
-) -> npt.NDArray[np.complex128]:
+) -> Complex:
     """Complex first odd harmonics of the lag D = omega_c - omega_0 in a periodic RR (23), rad s-1.
 
     D' = -c(R |D|) D/(1+2j) - omega_0', at two phases of half a period for every harmonic. With
@@ -79,16 +76,15 @@ def lag_harmonics(
         left = turn * (derivative @ lag) + drag.coefficient(speed, p) * lag / inertia + push
         if np.abs(left).max() <= SOLVED * amplitude * turn:
             return np.asarray(amplitudes @ lag, dtype=np.complex128)
-        lag = lag - np.linalg.solve(
-            turn * derivative + np.diag(drag.slope(speed, p) / inertia), left
-        )
+        jacobian = turn * derivative + np.diag(drag.slope(speed, p) / inertia)
+        lag = lag - np.linalg.solve(jacobian, left)
     raise ArithmeticError(
         f"no periodic lag in a pulsation by {amplitude:g} rad s-1 at {frequency:g} Hz"
     )
 
 
 @functools.cache
-def _collocation(harmonics: int) -> tuple[Array, npt.NDArray[np.complex128], Array]:
+def _collocation(harmonics: int) -> tuple[Array, Complex, Array]:
     """Phases of half a period; matrices from values there to amplitudes and to derivatives."""
     odd = np.arange(1, 2 * harmonics, 2)
     phase = np.linspace(0.0, math.pi, 2 * harmonics, endpoint=False)
@@ -129,10 +125,9 @@ def slip_onset(p: Parameters, frequency: float, leave_rolling: str = "slip-stabi
 
 def slow_onset(p: Parameters) -> float:
     """`slip_onset` at low frequency: the flow rises to omega_01 or omega_03, or falls to 0 (67)."""
-    t = bifurcation.thresholds(p)
-    return max(
-        0.0, min((t.omega_01 if p.eta < p.j else t.omega_03) - abs(p.omega_0), abs(p.omega_0))
-    )
+    t, flow = bifurcation.thresholds(p), abs(p.omega_0)
+    end = t.omega_01 if p.eta < p.j else t.omega_03
+    return max(0.0, min(end - flow, flow))
 
 
 def fast_onset(p: Parameters) -> float:
@@ -148,14 +143,9 @@ def fast_onset(p: Parameters) -> float:
     )
     push = drag.coefficient(p.R * floor, p) * p.R * floor
     lags = [wall] if math.hypot(ju, unit * push) > p.eta * u else [wall, floor]
-    # B_y = s m g with s^2 + z^2 = eta^2 (k - s)^2 and (ju - s)^2 + z^2 = mu^2 (1 - s)^2; z^2 drops
-    # out.
-    both = [
-        p.eta**2 - p.mu**2,
-        2 * (p.mu**2 - p.eta**2 * k - ju),
-        (p.eta * k) ** 2 - p.mu**2 + ju**2,
-    ]
-    for s in np.roots(both):
+    # B_y = s m g, s^2 + z^2 = eta^2 (k - s)^2 and (ju - s)^2 + z^2 = mu^2 (1 - s)^2 without z^2.
+    linear, constant = 2 * (p.mu**2 - p.eta**2 * k - ju), (p.eta * k) ** 2 - p.mu**2 + ju**2
+    for s in np.roots([p.eta**2 - p.mu**2, linear, constant]):
         if np.isreal(s) and 0 <= s.real <= min(ju, p.eta * k / (1 + p.eta)):
             push = math.sqrt((p.eta * (k - s.real)) ** 2 - s.real**2) / unit
             lags.append(float(drag.speed_of(push, p)) / p.R)
@@ -188,10 +178,8 @@ def mean_error(
         change = ends - starts
         if np.abs(change[-1]).max() <= settled * abs(p.omega_0):
             return float(run.theta[-1]) * frequency - p.omega_0
-        x = run.x[-1].copy()
-        x[TURNING] -= (
-            np.diff(ends, axis=0).T @ np.linalg.lstsq(np.diff(change, axis=0).T, change[-1])[0]
-        )
+        x, shares = run.x[-1].copy(), np.linalg.lstsq(np.diff(change, axis=0).T, change[-1])[0]
+        x[TURNING] -= np.diff(ends, axis=0).T @ shares
     raise SimulationError(
         f"a pulsation by {amplitude:g} rad s-1 at {frequency:g} Hz doesn't become periodic", run
     )

@@ -73,9 +73,8 @@ def rolling(p: Parameters, layer: bool = True) -> Rolling:
 
     def excess_friction(omega_c: Array) -> Array:
         lag = p.R * (flow - omega_c)
-        held = (
-            p.j * torque_rate(relative_spin(omega_c), p, layer) * (2 * p.R * omega_c + p.r * flow)
-        )
+        k = torque_rate(relative_spin(omega_c), p, layer)
+        held = p.j * k * (2 * p.R * omega_c + p.r * flow)
         return np.asarray(held - drag.coefficient(lag, p) * lag)
 
     omega_c = float(roots.sign_change(excess_friction, -flow * max(1.0, p.r / (2 * p.R)), flow))

@@ -14,7 +14,7 @@ from analytic.mechanics import dynamics
 from analytic.stationary import slipping_branch
 from analytic.stationary import solutions as stationary
 from model import Case, InputError, Parameters, State
-from model.arrays import Array
+from model.arrays import Array, Complex
 from model.cases import TRAITS
 from model.drag import STOKES
 
@@ -34,16 +34,15 @@ def rolling_rate(p: Parameters) -> float:
     return p.c / (1 + 2 * p.j)
 
 
-def transfer(p: Parameters, case: Case, frequency: npt.ArrayLike) -> npt.NDArray[np.complex128]:
+def transfer(p: Parameters, case: Case, frequency: npt.ArrayLike) -> Complex:
     """Complex omega_c divided by omega_0 in small pulsations at frequencies in Hz, same shape.
 
     About the stable motion of the case; its modulus is the gain, its argument the phase lead
     (negative: a lag). Raises `InputError` if there is no such motion."""
     J, b, own = _linearised(p, case)
     s = 2j * np.pi * np.asarray(frequency)[..., None, None]
-    return np.asarray(
-        np.linalg.solve(s * np.eye(len(b)) - J, b[:, None])[..., own, 0], dtype=np.complex128
-    )
+    found = np.linalg.solve(s * np.eye(len(b)) - J, b[:, None])
+    return np.asarray(found[..., own, 0], dtype=np.complex128)
 
 
 def step_response(p: Parameters, case: Case, t: npt.ArrayLike) -> Array:

@@ -229,11 +229,9 @@ def _implicit_step(
     x = Impulse(d - x.n, -x.s, -x.t)
     y = Impulse(-y.n, d - y.s, -y.t)
     z = Impulse(-z.n, -z.s, d - z.t)
-    yz = _cross(y, z)
+    yz, n, s = _cross(y, z), _cross(step, z), _cross(y, step)
     size = _dot(x, yz)
-    return Impulse(
-        _dot(step, yz) / size, _dot(x, _cross(step, z)) / size, _dot(x, _cross(y, step)) / size
-    )
+    return Impulse(_dot(step, yz) / size, _dot(x, n) / size, _dot(x, s) / size)
 
 
 def _contact_state(need: Impulse, given: Impulse) -> int:

@@ -76,17 +76,15 @@ def slope(speed: Real, p: Parameters) -> Real:
         return p.c
     linear, wake, blunt = law(p)
     slow, fast = wake * speed**EXPONENT, blunt * speed
-    return (linear + (1 + EXPONENT) * slow) * (linear + slow >= fast) + 2 * fast * (
-        linear + slow < fast
-    )
+    is_slow, is_fast = linear + slow >= fast, linear + slow < fast
+    return (linear + (1 + EXPONENT) * slow) * is_slow + 2 * fast * is_fast
 
 
 def speed_of(acceleration: npt.ArrayLike, p: Parameters) -> Array:
     """Speed |w| (m s-1) at which drag per mass, c(|w|) |w|, is as given (m s-2); inf for c = 0."""
-    given, terms, powers = np.asarray(acceleration, dtype=float), law(p), (1.0, 1.0 + EXPONENT, 2.0)
-    alone = [
-        (given / term) ** (1 / power) for term, power in zip(terms, powers, strict=True) if term > 0
-    ]
+    given, terms = np.asarray(acceleration, dtype=float), law(p)
+    powers = zip(terms, (1.0, 1.0 + EXPONENT, 2.0), strict=True)
+    alone = [(given / term) ** (1 / power) for term, power in powers if term > 0]
     if not alone:
         return np.where(given > 0, np.inf, given)
     speed: Array = np.minimum.reduce(alone)

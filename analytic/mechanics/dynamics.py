@@ -21,7 +21,7 @@ import numpy.typing as npt
 from analytic.mechanics import drag, rolling_forces
 from analytic.mechanics.rigid_body import Forces as Forces
 from model import Case, Contact, InputError, Parameters, State
-from model.arrays import Array, Real
+from model.arrays import Array, Complex, Real
 from model.cases import TRAITS
 from model.errors import check_type
 from model.kinematics import UNITS, VARIABLES
@@ -71,10 +71,8 @@ def contact_forces(
     if case is Case.RR:
         best = rolling_forces.least_utilisation(state.omega_c, p, fluid)
         if np.any(stuck := (best.utilisation > 1) | np.isnan(best.B_y)):
-            value, need = (
-                np.extract(stuck, np.broadcast_to(a, stuck.shape))[0]
-                for a in (state.omega_c, best.utilisation)
-            )
+            least = state.omega_c, best.utilisation
+            value, need = (np.extract(stuck, np.broadcast_to(a, stuck.shape))[0] for a in least)
             raise InputError(
                 f"omega_c = {value:g} rad s-1 cannot be rolled at both points: "
                 f"it takes {need:.4g} times the friction there is, the limit is 1"
@@ -103,9 +101,8 @@ def check_state(case: Case, x: npt.ArrayLike, p: Parameters) -> State:
     if case.B is Contact.N:
         _refuse(state.h < 0, state.h, "h", f"must be >= 0 in case {case.name}")
         _refuse(state.h >= p.R, state.h, "h", f"must be < R = {p.R:g} m")
-    for point, contact, slide in zip(
-        "AB", (case.A, case.B), sliding_velocities(state, p), strict=True
-    ):
+    contacts = zip("AB", (case.A, case.B), sliding_velocities(state, p), strict=True)
+    for point, contact, slide in contacts:
         if contact is Contact.S:
             speed = np.hypot(*slide)
             _refuse(speed == 0, speed, f"slip speed at {point}", f"must be > 0 in case {case.name}")
@@ -115,10 +112,9 @@ def check_state(case: Case, x: npt.ArrayLike, p: Parameters) -> State:
 def rates(case: Case, x: Sequence[Real], p: Parameters, omega_0: Real) -> State:
     """Rates of the eight state variables by (20) under the forces of the case; x is not checked."""
     _, _, omega_c, *_ = x
-    forces_now = (
-        rolling_family(omega_c, p, omega_0, 0.0) if case is Case.RR else forces(case, x, p, omega_0)
-    )
-    return newton_euler(case, x, forces_now, p, omega_0)
+    rolls = case is Case.RR
+    f = rolling_family(omega_c, p, omega_0, 0.0) if rolls else forces(case, x, p, omega_0)
+    return newton_euler(case, x, f, p, omega_0)
 
 
 def newton_euler(
@@ -275,9 +271,8 @@ def direction(along_sine: Real, along_cosine: Real) -> Direction:
         size = np.maximum(np.abs(along_sine), np.abs(along_cosine))
         speed = size * np.sqrt((along_sine / size) ** 2 + (along_cosine / size) ** 2)
     else:
-        speed = (math.hypot if isinstance(along_sine, float) else np.hypot)(
-            along_sine, along_cosine
-        )
+        hypot = math.hypot if isinstance(along_sine, float) else np.hypot
+        speed = hypot(along_sine, along_cosine)
     return along_sine / speed, along_cosine / speed
 
 
@@ -319,9 +314,9 @@ def jacobian(case: Case, x: npt.ArrayLike, p: Parameters) -> Array:
     return np.stack(np.broadcast_arrays(*columns), axis=-1)
 
 
-def eigenvalues(matrix: Array) -> npt.NDArray[np.complex128]:
+def eigenvalues(matrix: Array) -> Complex:
     """Eigenvalues (..., d) of matrices (..., d, d), rightmost first."""
     # From stiff slip to slow orbit: graded downwards, which keeps the small ones accurate.
-    values: npt.NDArray[np.complex128] = np.linalg.eigvals(matrix[..., ::-1, ::-1].astype(complex))
+    values: Complex = np.linalg.eigvals(matrix[..., ::-1, ::-1].astype(complex))
     order = np.lexsort((values.imag, -values.real), axis=-1)
     return np.take_along_axis(values, order, axis=-1)

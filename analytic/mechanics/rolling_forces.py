@@ -66,9 +66,8 @@ def slip_margin(
     docs/theory.md derives it."""
     u, z = _loads(omega_c, p, omega_0)
     share = _last_share(u, z, p)
-    return np.asarray(
-        np.minimum(p.eta * (1 + p.j) * u - z, p.mu * (1 - share) - np.hypot(p.j * u - share, z))
-    )
+    of_floor = p.mu * (1 - share) - np.hypot(p.j * u - share, z)
+    return np.asarray(np.minimum(p.eta * (1 + p.j) * u - z, of_floor))
 
 
 def _last_share(u: Array, z: Array, p: Parameters) -> Array:
@@ -130,9 +129,8 @@ def _loads(
     omega_c = np.asarray(omega_c, dtype=float)
     fluid = np.asarray(p.omega_0 if omega_0 is None else omega_0)
     u, lag = p.R / p.g * omega_c**2, np.abs(omega_c - fluid)
-    return np.asarray(u), np.asarray(
-        p.j * drag.coefficient(p.R * lag, p) * p.R / p.g * lag / (1 + 2 * p.j)
-    )
+    z = p.j * drag.coefficient(p.R * lag, p) * p.R / p.g * lag / (1 + 2 * p.j)
+    return np.asarray(u), np.asarray(z)
 
 
 def _interval(u: Array, z: Array, p: Parameters) -> tuple[Array, Array]:
@@ -158,9 +156,8 @@ def _normal_forces(d: Array, z: Array, friction: float) -> tuple[Array, Array]:
 def _least_utilisation_alone(d: Array, z: Array, friction: float) -> Array:
     """Least utilisation of one contact's friction over the family, whatever the other's."""
     hyp = np.hypot(d, z)
-    return _ratio(
-        np.where(d > 0, _ratio(z, hyp), np.where(hyp > 0, 1.0, 0.0)), np.asarray(friction)
-    )
+    needed = np.where(d > 0, _ratio(z, hyp), np.where(hyp > 0, 1.0, 0.0))
+    return _ratio(needed, np.asarray(friction))
 
 
 def _ratio(load: Array, limit: Array) -> Array:

@@ -35,11 +35,9 @@ def sign_change(f: Callable[[Array], Real], start: npt.ArrayLike, end: npt.Array
             if np.all((least >= 0.5) | (f_a == 0) | (a == b) | ~changes):
                 break
             xi, phi = (a - b) / (c - b), (f_a - f_b) / (f_c - f_b)
-            guess = f_a / (f_b - f_a) * f_c / (f_b - f_c) + (c - a) / (b - a) * f_a / (
-                f_c - f_a
-            ) * f_b / (f_c - f_b)
+            far = (c - a) / (b - a) * f_a / (f_c - f_a) * f_b / (f_c - f_b)
+            guess = f_a / (f_b - f_a) * f_c / (f_b - f_c) + far
             trusted = (phi**2 < xi) & ((1 - phi) ** 2 < 1 - xi) & np.isfinite(guess)
-            share = np.clip(
-                np.where(trusted, guess, 0.5), np.minimum(least, 0.5), np.maximum(1 - least, 0.5)
-            )
+            ends = np.minimum(least, 0.5), np.maximum(1 - least, 0.5)
+            share = np.clip(np.where(trusted, guess, 0.5), *ends)
     return np.where(changes, np.where(f_a == 0, a, best), np.nan)

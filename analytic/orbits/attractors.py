@@ -174,9 +174,8 @@ def attractors(
                     groups.append(group := [])
                 group.append(limit)
         progress(sum(map(len, groups)) / len(states))
-        following = goes_on + [
-            (each, next(each)) for each in islice(todo, SIDE_BY_SIDE - len(goes_on))
-        ]
+        more = islice(todo, SIDE_BY_SIDE - len(goes_on))
+        following = goes_on + [(each, next(each)) for each in more]
     groups.sort(key=len, reverse=True)
     return [Attractor(group[0], len(group), len(states)) for group in groups]
 
@@ -249,9 +248,9 @@ def periodic_limit(last: Trajectory) -> LimitSet | None:
     earlier."""
     p, size = last.header.parameters, extent(last)
     z, n, interval = last.x / state_units(p), len(last.x) // 2, float(last.time[1] - last.time[0])
-    away = np.array(
-        [np.abs(z[-n // 4 :: 5] - z[-n // 4 - lag : len(z) - lag : 5]).max() for lag in range(n)]
-    )
+    quarter = -n // 4
+    earlier = (z[quarter - lag : len(z) - lag : 5] for lag in range(n))
+    away = np.array([np.abs(z[quarter::5] - each).max() for each in earlier])
     left = int(np.argmax(away > size / 2))
     inner = np.arange(left + 1, n - 1)
     dips = inner[(away[inner] <= away[inner - 1]) & (away[inner] < away[inner + 1])]

@@ -18,7 +18,7 @@ from scipy.optimize import brentq
 from analytic.orbits import periodic
 from analytic.orbits.periodic import Changes, NoOrbitError, Orbit, landings, refine
 from model import InputError, Parameters, State
-from model.arrays import Array
+from model.arrays import Array, Complex
 from model.parameters import check_names, check_number
 
 FIRST_STEP, LEAST_STEP, LONGEST_STEP = 0.2, 1e-5, 0.5
@@ -234,12 +234,12 @@ def _rotated_to_least(changes: Changes) -> Changes:
 
 def _on_other_branch(here: Orbit, by: Array, changes: Changes) -> bool:
     """Whether a long step led to another number of landings, so to another branch."""
-    return bool(np.linalg.norm(by) > GRAZING) and sum(landings(changes)) != sum(
-        landings(here.changes)
-    )
+    if np.linalg.norm(by) <= GRAZING:
+        return False
+    return bool(sum(landings(changes)) != sum(landings(here.changes)))
 
 
-_TESTS: dict[Bifurcation, Callable[[npt.NDArray[np.complex128]], float]] = {
+_TESTS: dict[Bifurcation, Callable[[Complex], float]] = {
     Bifurcation.FOLD: lambda m: -float(np.prod(1 - m[np.isreal(m)].real)),
     Bifurcation.DOUBLING: lambda m: -float(np.prod(1 + m[np.isreal(m)].real)),
     Bifurcation.TORUS: lambda m: float(np.abs(m[np.imag(m) != 0]).max(initial=0.0)) - 1,

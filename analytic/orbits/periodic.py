@@ -23,7 +23,7 @@ from analytic.mechanics import dynamics
 from analytic.simulation.settings import Settings
 from analytic.simulation.simulator import simulate
 from model import Case, Contact, InputError, Parameters, SimulationError, State, Trajectory
-from model.arrays import Array
+from model.arrays import Array, Complex
 from model.cases import TRAITS
 from model.kinematics import VARIABLES, state_units
 
@@ -97,11 +97,10 @@ class Loop:
             raise NoOrbitError(f"the ball rolls at both points all the time (period {period:g} s)")
         case, start, end = max(stretches, key=lambda each: each[2] - each[1])
         inner = np.abs(run.time - (start + end) / 2) <= (end - start) / 4
-        rates = np.abs(
-            [dynamics.rates(case, z, p, p.omega_0) for z in run.x[inner].tolist()]
-        ) / state_units(p)
+        rates = [dynamics.rates(case, z, p, p.omega_0) for z in run.x[inner].tolist()]
         active = active_variables(case)
-        at, fixed = np.unravel_index(np.argmax(rates[:, active]), (len(rates), len(active)))
+        fast = (np.abs(rates) / state_units(p))[:, active]
+        at, fixed = np.unravel_index(np.argmax(fast), fast.shape)
         return cls(p, case, run.x[inner][at], period, active[int(fixed)], size, restitution)
 
     def value(self, name: str) -> float:
@@ -110,10 +109,9 @@ class Loop:
 
     def with_value(self, name: str, value: float) -> Loop:
         """The loop with another value of a parameter, or of the coefficient of restitution."""
-        changed = (
-            {RESTITUTION: value} if name == RESTITUTION else {"p": self.p.replace(**{name: value})}
-        )
-        return replace(self, **changed)
+        if name == RESTITUTION:
+            return replace(self, restitution=value)
+        return replace(self, p=self.p.replace(**{name: value}))
 
     @property
     def free(self) -> list[int]:
@@ -133,10 +131,10 @@ class Loop:
         if self.case is Case.RN:
             x = State.of(x)._replace(slip_z=-State.of(x).v_h / self.p.r).stacked()
         moved = replace(self, x=x)
+        if not varied:
+            return moved
         try:
-            return (
-                moved.with_value(varied, self.value(varied) * math.exp(by[-1])) if varied else moved
-            )
+            return moved.with_value(varied, self.value(varied) * math.exp(by[-1]))
         except InputError as error:
             raise NoOrbitError(str(error)) from error
 
@@ -168,10 +166,8 @@ class Loop:
                 raise NoOrbitError(f"after {self.period:g} s the ball is far from where it was")
             path = solve_ivp(rates, (0.0, short), x, "DOP853", rtol=RETURN_RTOL, atol=tolerance)
             x = np.asarray(path.y[:, -1])
-        changes = tuple(
-            (Case(a), Case(b))
-            for a, b in zip(run.events.from_case, run.events.to_case, strict=True)
-        )
+        codes = zip(run.events.from_case, run.events.to_case, strict=True)
+        changes = tuple((Case(before), Case(after)) for before, after in codes)
         turn = run.theta[-1] - run.theta[0] + late * (State.of(x).omega_c + run.omega_c[-1]) / 2
         return Return(x, float(self.period + late), changes, float(turn))
 
@@ -222,7 +218,7 @@ class Orbit:
         return self.loop.p
 
     @cached_property
-    def multipliers(self) -> npt.NDArray[np.complex128]:
+    def multipliers(self) -> Complex:
         """Floquet multipliers (d - 1,), d the dimension of the case, largest modulus first."""
         values = np.linalg.eigvals(self.derivative).astype(complex)
         return np.asarray(values[np.argsort(-np.abs(values), kind="stable")])
@@ -281,12 +277,10 @@ def close_loop(loop: Loop, varied: str | None, neighbour: Array | None) -> tuple
         size = float(np.abs(defect).max())
         if size <= CLOSED:
             return loop, back, step
-        if size > before / FAST:
-            neighbour = None
+        matrix = neighbour = None if size > before / FAST else neighbour
         before = size
-        matrix = (
-            defect_jacobian(loop, loop.derivative(), varied) if neighbour is None else neighbour
-        )
+        if matrix is None:
+            matrix = defect_jacobian(loop, loop.derivative(), varied)
         loop = loop.moved(np.asarray(-np.linalg.lstsq(matrix, defect)[0], dtype=float), varied)
     raise NoOrbitError(
         f"after {ITERATIONS} steps an orbit of period {loop.period:g} s is open by {size:.1e} in "

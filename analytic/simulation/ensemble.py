@@ -80,14 +80,12 @@ def simulate_many(
     if {len(sets), len(starts), len(flows)} - {1, count}:
         raise InputError(
             f"every run needs parameters, a start and a flow: there are {len(sets)} parameter "
-            f"sets, {len(starts)} "
-            f"starts and {len(flows)} flows; each must be one, or as many as the others"
+            f"sets, {len(starts)} starts and {len(flows)} flows; each must be one, or as many as "
+            "the others"
         )
     sets, flows = sets * (count // len(sets)), flows * (count // len(flows))
-    states = [
-        start_state(x, p, settings)
-        for x, p in zip(np.resize(starts, (count, starts.shape[1])), sets, strict=True)
-    ]
+    starts = np.resize(starts, (count, starts.shape[1]))
+    states = [start_state(x, p, settings) for x, p in zip(starts, sets, strict=True)]
     times = sample_times(t_end, sample_interval)
     still = np.inf if quiet is None else check_number("quiet", quiet, "s", POSITIVE)
     if threads is None:

@@ -253,10 +253,9 @@ def guards(t: float, z: Any, k: System, out: Any) -> None:
     elif k.case == SS:
         out[0], out[1], out[2], out[3] = q_A / k.spin, q_B / k.spin, A_y / G, B_x / G
     else:
-        slips = (
-            q_B / k.spin if k.case == NS else (k.eta * B_x - math.sqrt(B_y * B_y + B_z * B_z)) / G
-        )
-        out[0], out[1] = z[1] / k.R, slips
+        out[0], out[1] = z[1] / k.R, q_B / k.spin
+        if k.case == NR:
+            out[1] = (k.eta * B_x - math.sqrt(B_y * B_y + B_z * B_z)) / G
 
 
 def loads(omega_c: float, t: float, k: System) -> tuple[float, float]:
@@ -275,9 +274,8 @@ def last_share(u: float, z: float, k: System) -> float:
 def slip_margin(u: float, z: float, k: System) -> float:
     """How far RR is from lasting slip, in units of m g, as `rolling_forces.slip_margin`."""
     share = last_share(u, z, k)
-    return min(
-        k.eta * (1 + k.j) * u - z, k.mu * (1 - share) - math.sqrt((k.j * u - share) ** 2 + z * z)
-    )
+    of_floor = k.mu * (1 - share) - math.sqrt((k.j * u - share) ** 2 + z * z)
+    return min(k.eta * (1 + k.j) * u - z, of_floor)
 
 
 def rolls_on(omega_c: float, t: float, k: System) -> float:

@@ -62,9 +62,8 @@ def follow(
     equations.guards(at.time, z, k, values)
     opens = coordinates.arm_guards(values, k, arm, level)
     lasts = coordinates.rebound_time(at, z, k, rate)
-    pace = first_pace(
-        at.time, z, scale, case, opens, lasts / 20 if lasts < until - at.time else 0.0
-    )
+    first = lasts / 20 if lasts < until - at.time else 0.0
+    pace = first_pace(at.time, z, scale, case, opens, first)
     if run.taken[0] == 0:
         _keep_sample(at, k, run)
     of = Stretch(k, until, z, scale, run.times, run.x, arm, level)
@@ -136,9 +135,8 @@ def run_through_flow(
     for n in range(max(begun - 1, 0), len(pieces)):
         piece = pieces[n]
         end = piece[1]
-        k = equations.in_case(
-            k, k.case, k.side, equations.Line(piece[2], piece[3], piece[4]), k.fall
-        )
+        line = equations.Line(piece[2], piece[3], piece[4])
+        k = equations.in_case(k, k.case, k.side, line, k.fall)
         if begun <= n:
             begun = n + 1
             if case == NONE or piece[5] != 0:
@@ -195,9 +193,8 @@ def _carry_out(start: HybridState, k: System, pieces: Array, recorder: Recorder)
     run, stage, done = recorder.begin(), Stage(start), False
     strides = STRIDES if len(run.path) else ENDLESS
     while not done:
-        done, (time, theta, x, *rest), *far = run_through_flow(
-            stage, k, pieces, run, strides, STEPS
-        )
+        done, parts, *far = run_through_flow(stage, k, pieces, run, strides, STEPS)
+        time, theta, x, *rest = parts
         stage = Stage(HybridState(time, theta, State(*x), *rest), *far)
         recorder.look()
 

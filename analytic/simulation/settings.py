@@ -95,9 +95,8 @@ def start_state(x0: npt.ArrayLike, p: Parameters, settings: Settings) -> State:
     if not settings.initial_impact:
         for place, gap, name, speed in (("floor", x.y, "v_y", x.v_y), ("wall", x.h, "v_h", x.v_h)):
             if gap == 0:
-                meaning = (
-                    f"to begin on the {place} without an impact (initial_impact of Settings) it"
-                )
+                without = "without an impact (initial_impact of Settings) it"
+                meaning = f"to begin on the {place} {without}"
                 check_number(name, speed, "m s-1", NOT_NEGATIVE, meaning)
     return x
 

@@ -23,9 +23,8 @@ DONE, FIRED, STUCK, PAUSED, OTHER = range(5)
 """Why steps end: at the end, at a guard, because they would be too short, for a breath, or as the
 other method should go on."""
 EPS = math.ulp(1.0)
-A, B, C, E3, E5, D = (
-    np.ascontiguousarray(getattr(DOP853, name)) for name in ("A", "B", "C", "E3", "E5", "D")
-)
+_NAMES = ("A", "B", "C", "E3", "E5", "D")
+A, B, C, E3, E5, D = (np.ascontiguousarray(getattr(DOP853, name)) for name in _NAMES)
 A_MORE, C_MORE = np.ascontiguousarray(DOP853.A_EXTRA), np.ascontiguousarray(DOP853.C_EXTRA)
 STAGES, ALL = len(B), len(B) + 1 + len(C_MORE)
 GROWN_SLIP = 1e-4
@@ -284,9 +283,8 @@ def explicit_steps(
             fired, share = _first_fall(start + tau, h, k, z, F, arm, level, seen, now, values)
             until = tau + share * h if fired >= 0 else after
             while taken < len(times) and _is_past(times[taken], start, until):
-                _interpolate(
-                    min(max((times[taken] - start - tau) / h, 0.0), 1.0), z, F, samples[taken]
-                )
+                due = min(max((times[taken] - start - tau) / h, 0.0), 1.0)
+                _interpolate(due, z, F, samples[taken])
                 taken += 1
             if fired >= 0:
                 _interpolate(share, z, F, now)
@@ -302,9 +300,8 @@ def explicit_steps(
         least = coordinates.least_slip(z, scale, k.case)
         slow = slow + 1 if least <= SMALL_SLIP else 0
         left = _time_to_stop(K[0], rtol, of) if least < DYING else math.inf
-        if tau + left <= span and (
-            taken == len(times) or not _is_past(times[taken], start, tau + left)
-        ):
+        sampled = taken < len(times) and _is_past(times[taken], start, tau + left)
+        if tau + left <= span and not sampled:
             for i in range(n):
                 z[i] += left * K[0, i]
             equations.guards(start + tau + left, z, k, values)
@@ -373,9 +370,8 @@ def _extrapolation_step(
             for i in range(n):
                 more = (table[q + 1, i] - table[q, i]) / (steps / (q + 1) - 1)
                 table[q, i] = table[q + 1, i] + more
-                square += (
-                    more / (rtol * (of.scale[i] / FINER + max(abs(z[i]), abs(table[q, i]))))
-                ) ** 2
+                size = rtol * (of.scale[i] / FINER + max(abs(z[i]), abs(table[q, i])))
+                square += (more / size) ** 2
         error = math.sqrt(square / n) if column > 0 else math.inf
         if error <= 1 or (not error < 1e10 and column > 0):
             return error, steps
@@ -399,9 +395,8 @@ def implicit_steps(
         equations.rates(start + tau, z, k, here)
         for c in range(n):
             now[:] = z
-            now[c] += math.sqrt(EPS) * max(
-                abs(z[c]), scale[c] * (k.rtol if c in range(first, end, 2) else 1.0)
-            )
+            is_slip = c in range(first, end, 2)
+            now[c] += math.sqrt(EPS) * max(abs(z[c]), scale[c] * (k.rtol if is_slip else 1.0))
             equations.rates(start + tau, now, k, rate)
             for i in range(n):
                 J[i, c] = (rate[i] - here[i]) / (now[c] - z[c])
@@ -447,9 +442,8 @@ def implicit_steps(
             samples[taken, :n] = z
             taken += 1
         if length == h or error < 0.01:
-            h = length * min(
-                4.0, 1.4 ** (USUAL - columns) * SAFETY * max(error, 1e-3) ** (-1 / columns)
-            )
+            grow = 1.4 ** (USUAL - columns) * SAFETY * max(error, 1e-3) ** (-1 / columns)
+            h = length * min(4.0, grow)
         if coordinates.least_slip(z, scale, k.case) > GROWN_SLIP:
             return OTHER, tau, 0.0, -1, taken
     return PAUSED, tau, h, -1, taken

@@ -256,12 +256,9 @@ def _pushed(free: Velocities, A: Impulse, B: Impulse, p: Constants) -> Velocitie
 
 def _change(before: Velocities, new: Velocities, r: float) -> float:
     """By how much velocities differ, m s-1: a sum, since max overlooks nan."""
-    change: float = (
-        abs(new.v_h - before.v_h) + abs(new.v_y - before.v_y) + abs(new.v_k - before.v_k)
-    )
-    change += r * (
-        abs(new.o_x - before.o_x) + abs(new.o_y - before.o_y) + abs(new.o_z - before.o_z)
-    )
+    v_h, v_y, v_k = new.v_h - before.v_h, new.v_y - before.v_y, new.v_k - before.v_k
+    o_x, o_y, o_z = new.o_x - before.o_x, new.o_y - before.o_y, new.o_z - before.o_z
+    change: float = abs(v_h) + abs(v_y) + abs(v_k) + r * (abs(o_x) + abs(o_y) + abs(o_z))
     return change
 
 
@@ -283,9 +280,8 @@ def _old_slip(at: BallState, dt: float, p: Constants) -> Slips:
     where it may stop, friction opposes the final slip, so that it can't reverse."""
     u, share, none = at.u, p.j / (1 + p.j), (0.0, 0.0)
     A, B = rigid_body.slip_at_A(u, p), rigid_body.slip_at_B(u, p)
-    load = SLIDES * (
-        max(p.g * dt - u.v_y, 0.0) + max(u.v_k * u.v_k / (p.R - at.h) * dt - u.v_h, 0.0)
-    )
+    on_wall = max(u.v_k * u.v_k / (p.R - at.h) * dt - u.v_h, 0.0)
+    load = SLIDES * (max(p.g * dt - u.v_y, 0.0) + on_wall)
     slides_A = dt > 0 and share * _length(A[0], A[1]) > p.mu * load
     slides_B = dt > 0 and share * _length(B[0], B[1]) > p.eta * load
     return A if slides_A else none, B if slides_B else none
@@ -338,10 +334,11 @@ def _step_to_landing(
     time = dt
     s = solve(at, dt, omega_0, touching, start, p)
     after = _moved(at, dt, s, touching, p.R)
-    to_floor = (
-        _crossing(at.y, at.u.v_y, after.y, dt) if not touching.A and after.y < 0 else math.inf
-    )
-    to_wall = _crossing(at.h, at.u.v_h, after.h, dt) if not touching.B and after.h < 0 else math.inf
+    to_floor = to_wall = math.inf
+    if not touching.A and after.y < 0:
+        to_floor = _crossing(at.y, at.u.v_y, after.y, dt)
+    if not touching.B and after.h < 0:
+        to_wall = _crossing(at.h, at.u.v_h, after.h, dt)
     floor, better = to_floor <= to_wall, min(to_floor, to_wall)
     if better == math.inf or s.residual != 0:
         return after, s, dt
@@ -427,9 +424,8 @@ def _flow_at(flow: FlowArrays, time: float) -> float:
         k = max(int(np.searchsorted(flow.start, time, side="right")) - 1, 0)
     omega_0 = flow.value[k] + flow.slope[k] * max(time - flow.start[k], 0.0)
     for n in range(len(flow.waves)):
-        omega_0 += flow.waves[n, 0] * math.sin(
-            2 * math.pi * flow.waves[n, 1] * time + flow.waves[n, 2]
-        )
+        wave = flow.waves[n]
+        omega_0 += wave[0] * math.sin(2 * math.pi * wave[1] * time + wave[2])
     return float(omega_0)
 
 

@@ -73,9 +73,8 @@ def prepared(
     shortest, _ = time_scales.shortest_time(*problem)
     timestep = settings.timestep or min(math.sqrt(p.R / p.g) / 500, shortest / 2)
     time_scales.check_timestep(timestep, *problem)
-    check_number(
-        "t_end", t_end, "s", Range(high=MAX_STEPS * timestep), f"for at most {MAX_STEPS:g} steps it"
-    )
+    meaning = f"for at most {MAX_STEPS:g} steps it"
+    check_number("t_end", t_end, "s", Range(high=MAX_STEPS * timestep), meaning)
     knots = np.union1d(times, flow.knots(t_end))
     length = np.diff(knots)
     steps = np.ceil(length / timestep * (1 - 1e-12)).astype(np.int64)

@@ -122,9 +122,7 @@ def leave(at: HybridState, k: System) -> tuple[int, HybridState]:
     return SS, with_directions(at, at.x, alpha, beta)
 
 
-def _forces(
-    case: int, at: HybridState, k: System
-) -> tuple[float, float, float, float, float, float]:
+def _forces(case: int, at: HybridState, k: System) -> tuple[float, ...]:
     """Forces of floor and wall in a case at the wall, as `equations.forces`, N."""
     x, lag = at.x, at.x.omega_c - equations.fluid(at.time, k)
     s_A, c_A = math.sin(at.alpha), math.cos(at.alpha)
@@ -209,9 +207,8 @@ def collide(at: HybridState, k: System) -> tuple[HybridState, Forces]:
     left = Velocities(v_h, v_y, u.v_k, u.o_x, u.o_y, u.o_z)
     y, v_y, omega_c, slip_x, slip_y, slip_z, h, v_h = rigid_body.state(x.y, x.h, left, k)
     spin = k.r * k.r * (before.o_x * before.o_x + before.o_y * before.o_y + before.o_z * before.o_z)
-    still = AT_REST * math.sqrt(
-        before.v_h * before.v_h + before.v_y * before.v_y + before.v_k * before.v_k + spin
-    )
+    speed = before.v_h * before.v_h + before.v_y * before.v_y + before.v_k * before.v_k
+    still = AT_REST * math.sqrt(speed + spin)
     (s_A, t_A), (s_B, t_B) = rigid_body.slip_at_A(u, k), rigid_body.slip_at_B(u, k)
     if A.closed and P.A_y > 0 and math.hypot(s_A, t_A) <= still:
         slip_x, slip_z = 0.0, -(v_h + v_y) / k.r

@@ -56,9 +56,8 @@ class HeldBound:
         if self.p.c == 0:
             return math.inf
         push = self.side * (1 + self.p.j) * self.p.r * self.hold
-        return self.omega_c + math.copysign(
-            float(drag.speed_of(abs(push), self.p)) / self.p.R, push
-        )
+        lag = float(drag.speed_of(abs(push), self.p)) / self.p.R
+        return self.omega_c + math.copysign(lag, push)
 
     @property
     def slope(self) -> float:
@@ -156,8 +155,5 @@ def _nr_terms(x: npt.ArrayLike, p: Parameters) -> tuple[Array, Array, Array]:
     lag = p.R * (p.omega_0 - omega_c)
     c = drag.coefficient(drag.speed(0.0, v_y, lag), p)
     pull = (p.g + c * v_y + p.R * omega_c**2) / p.r + omega_c * slip_x
-    return (
-        np.asarray(pull),
-        np.asarray(c * lag / p.r),
-        p.eta * p.R * (1 + p.j) / (p.j * p.r) * omega_c**2,
-    )
+    friction = p.eta * p.R * (1 + p.j) / (p.j * p.r) * omega_c**2
+    return np.asarray(pull), np.asarray(c * lag / p.r), friction

@@ -45,9 +45,8 @@ class SlipStability(Enum):
 
 def normals(inner: Case, outer: Case) -> tuple[str, ...]:
     """Names of the slips that `outer` frees and `inner` holds at zero; they span W (51)."""
-    return tuple(
-        name for name in _SLIPS if name in TRAITS[outer].active and name not in TRAITS[inner].active
-    )
+    held, free = TRAITS[inner].active, TRAITS[outer].active
+    return tuple(name for name in _SLIPS if name in free and name not in held)
 
 
 def slip_rates(
@@ -69,10 +68,8 @@ def slip_rates(
     )
     force = dynamics.forces(outer, state, p, p.omega_0, slip_A, slip_B)
     rates = dynamics.newton_euler(outer, state, force, p, p.omega_0)
-    slips = (getattr(rates, name) for name in names)
-    *along, A_y, B_x = (
-        np.broadcast_to(value, n.shape[:-1]) for value in (*slips, force.A_y, force.B_x)
-    )
+    values = *(getattr(rates, name) for name in names), force.A_y, force.B_x
+    *along, A_y, B_x = (np.broadcast_to(value, n.shape[:-1]) for value in values)
     return np.stack(along, axis=-1), A_y, B_x
 
 
@@ -100,9 +97,8 @@ def lift_onset(inner: Case, outer: Case, x: npt.ArrayLike, p: Parameters) -> flo
     def lift_at(omega_c: float) -> float:
         slip_x = state.slip_x * omega_c / state.omega_c if inner is Case.SR else state.slip_x
         there = state._replace(omega_c=omega_c, slip_x=slip_x)
-        return lift_acceleration(
-            inner, outer, there, p.replace(omega_0=p.omega_0 * omega_c / state.omega_c)
-        )
+        q = p.replace(omega_0=p.omega_0 * omega_c / state.omega_c)
+        return lift_acceleration(inner, outer, there, q)
 
     return float(roots.sign_change(np.vectorize(lift_at), 0.1 * state.omega_c, 10 * state.omega_c))
 

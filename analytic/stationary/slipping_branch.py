@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from analytic.mechanics import drag, dynamics, roots
 from model import Case, InputError, Parameters, State
-from model.arrays import Array
+from model.arrays import Array, Complex
 
 END = 80.0
 """|s| at which the ends are reached to round-off: tan alpha = exp(-80) = 2e-35."""
@@ -71,9 +71,8 @@ def branch(
     lag = drag.speed_of(p.g * held, p)
     Omega_0, stiffness = Omega_c + lag / np.sqrt(p.g * p.R), drag.slope(lag, p) * np.sqrt(p.R / p.g)
     v_A, A_y, B_x = slip / (p.j * Omega_c), (p.j - eta) * cos / den, mu * (1 + p.j * cos**2) / den
-    return BranchPoint(
-        *np.broadcast_arrays(cos, sin, Omega_c, Omega_0, held, stiffness, v_A, A_y, B_x)
-    )
+    values = cos, sin, Omega_c, Omega_0, held, stiffness, v_A, A_y, B_x
+    return BranchPoint(*np.broadcast_arrays(*values))
 
 
 def slope(
@@ -109,9 +108,8 @@ def _slopes(
     turned = 1 + 2 * mu * eta * at.cos - eta * at.cos**2
     orbit = np.sign(p.j - eta) * at.stiffness * turned / (2 * at.Omega_c * at.sin)
     den = _denominator(at.cos, p.j, mu, eta)
-    return np.asarray(orbit), np.asarray(
-        den * (at.cos / at.sin) ** 2 - mu * eta * (1 - p.j * at.cos**2)
-    )
+    lag = den * (at.cos / at.sin) ** 2 - mu * eta * (1 - p.j * at.cos**2)
+    return np.asarray(orbit), np.asarray(lag)
 
 
 def light_drag(p: Parameters) -> float:
@@ -144,9 +142,8 @@ def fold(
     exists = (eta > eta_critical(mu, p)) & (eta < p.j) & (p.c > 0)
     if released:
         lowest = np.clip((eta - p.j) / np.where(mu * eta > 0, 2 * p.j * mu * eta, 1.0), 0.0, 1.0)
-        exists = exists | (eta > p.j) & (mu > 0) & (p.c > 0) & (
-            _denominator(lowest, p.j, mu, eta) > 0
-        )
+        whole = _denominator(lowest, p.j, mu, eta) > 0
+        exists = exists | (eta > p.j) & (mu > 0) & (p.c > 0) & whole
     if not np.any(exists):
         return np.full(mu.shape, np.nan)
     # Valid numbers where there is no fold; the root there is discarded.
@@ -165,10 +162,10 @@ def points_at(p: Parameters) -> list[float]:
     turning = float(fold(p))
     parts = [(-END, END)] if np.isnan(turning) else [(-END, turning), (turning, END)]
 
-    places = [
-        float(roots.sign_change(lambda s: branch(s, p).Omega_0 - p.Omega_0, *part))
-        for part in parts
-    ]
+    def excess(s: Array) -> Array:
+        return branch(s, p).Omega_0 - p.Omega_0
+
+    places = [float(roots.sign_change(excess, *part)) for part in parts]
     return [s for s in places if not np.isnan(s)]
 
 
@@ -176,9 +173,8 @@ def _friction(
     p: Parameters, mu: npt.ArrayLike | None, eta: npt.ArrayLike | None
 ) -> tuple[Array, Array]:
     """The given coefficients, or those of p."""
-    return np.asarray(p.mu if mu is None else mu, dtype=float), np.asarray(
-        p.eta if eta is None else eta, dtype=float
-    )
+    mu, eta = p.mu if mu is None else mu, p.eta if eta is None else eta
+    return np.asarray(mu, dtype=float), np.asarray(eta, dtype=float)
 
 
 def _denominator(cos: Array, j: float, mu: Array, eta: Array) -> Array:
@@ -191,12 +187,11 @@ def states(s: npt.ArrayLike, p: Parameters) -> tuple[Array, Array]:
     b = branch(s, p)
     unit, w = np.sqrt(p.g / p.R), b.v_A * np.sqrt(p.g * p.R) / p.r
     turn = np.sign(p.eta - p.j) * b.sin
-    return State(
-        omega_c=b.Omega_c * unit, slip_x=w * turn, slip_z=w * b.cos
-    ).stacked(), b.Omega_0 * unit
+    x = State(omega_c=b.Omega_c * unit, slip_x=w * turn, slip_z=w * b.cos)
+    return x.stacked(), b.Omega_0 * unit
 
 
-def eigenvalues_at(s: npt.ArrayLike, p: Parameters) -> npt.NDArray[np.complex128]:
+def eigenvalues_at(s: npt.ArrayLike, p: Parameters) -> Complex:
     """Eigenvalues (..., 4) of SS at places s of its branch, rad s-1, rightmost first.
 
     Those of `dynamics.jacobian`, from the coordinates omega_c, v_A/r, alpha and slip_y/slip_z

@@ -13,14 +13,13 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
-import numpy.typing as npt
 
 from analytic.mechanics import drag, dynamics, rolling_forces
 from analytic.slipping import slip_stability
 from analytic.slipping.slip_stability import SlipStability
 from analytic.stationary import slipping_branch
 from model import Case, InputError, Parameters, State
-from model.arrays import Array
+from model.arrays import Array, Complex
 from model.drag import QUADRATIC, STOKES
 from model.errors import check_type
 
@@ -54,7 +53,7 @@ class StationarySolution:
     """Force of the floor, N, shape (3,); in RR the member of least friction utilisation."""
     force_B: Array
     """Force of the wall, N, shape (3,)."""
-    eigenvalues: npt.NDArray[np.complex128]
+    eigenvalues: Complex
     """Of the Jacobian in the active variables (in NS without y), rad s-1, rightmost first."""
     exists: bool
     """Whether the contact forces obey (12) and (13)."""
@@ -123,16 +122,14 @@ def solution(
     A case may be given by its name. Raises `InputError` if there is none, or more than one (two are
     unstable between the Hopf points of a very rough floor)."""
     case = Case(case)
-    those = [
-        s for s in stationary_solutions(p, (case,)) if s.stable == stable and (formal or s.exists)
-    ]
+    listed = [s for s in stationary_solutions(p, (case,)) if formal or s.exists]
+    those = [s for s in listed if s.stable == stable]
     if len(those) != 1:
         raise InputError(
             f"case {case.name} has {len(those) or 'no'} {'stable' if stable else 'unstable'} "
-            f"stationary "
-            f"solution{'s' if those else ''} at omega_0 = {p.omega_0:g} rad s-1 "
-            f"(mu = {p.mu:g}, eta = {p.eta:g}, j = {p.j:g}, c = {p.c:g} s-1, R = {p.R:g} m, g = "
-            f"{p.g:g} m s-2)"
+            f"stationary solution{'s' if those else ''} at omega_0 = {p.omega_0:g} rad s-1 "
+            f"(mu = {p.mu:g}, eta = {p.eta:g}, j = {p.j:g}, c = {p.c:g} s-1, R = {p.R:g} m, "
+            f"g = {p.g:g} m s-2)"
         )
     return those[0]
 
@@ -173,7 +170,7 @@ def _solution(
     x: State,
     exists: bool,
     family: tuple[str, ...] = (),
-    values: npt.NDArray[np.complex128] | None = None,
+    values: Complex | None = None,
 ) -> StationarySolution:
     """The stationary solution at a state x; eigenvalues by the Jacobian unless given."""
     if p.c == 0:  # nothing pulls omega_c to omega_0
@@ -204,7 +201,7 @@ def _solution(
     )
 
 
-def _stability(values: npt.NDArray[np.complex128], zeros: int, neutral: bool) -> Stability:
+def _stability(values: Complex, zeros: int, neutral: bool) -> Stability:
     """Stability by the rightmost eigenvalue, but for the `zeros` of a family's free variables."""
     rest = values[np.argsort(np.abs(values))][zeros:]
     if np.any(rest.real > _LEAST_REAL_PART * np.abs(rest)):
@@ -285,7 +282,7 @@ def _wall_carries(p: Parameters) -> bool:
     return p.eta * p.Omega_0**2 >= 1
 
 
-def eigenmodes_SR(p: Parameters) -> tuple[npt.NDArray[np.complex128], npt.NDArray[np.complex128]]:
+def eigenmodes_SR(p: Parameters) -> tuple[Complex, Complex]:
     """Eigenvalues (2,), rad s-1, of f_SR at its stationary solution; unit vectors as rows (2, 2).
 
     There A_y = 0, the border to NR (Proposition 3): the eigenvalues show on the side A_y > 0 only,
