@@ -6,12 +6,11 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from compare.bench.case import read
     from compare.bench.exact import cases
     from compare.bench.runner import Result, run
 
-__all__ = ["Result", "cases", "read", "run"]
-_MODULES = {"Result": "runner", "cases": "exact", "read": "case", "run": "runner"}
+__all__ = ["Result", "cases", "run"]
+_MODULES = {"Result": "runner", "cases": "exact", "run": "runner"}
 
 
 def __getattr__(name: str) -> Any:

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
-from pathlib import Path
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from compare.engines.adapters.scene import TIME_STEPS, Body, Scene, Surface, in_body_axes
+from compare.engines.adapters.scene import TIME_STEPS, Body, Scene, in_body_axes
 from compare.method.statistics import plain
-from model import InputError
 from model.arrays import Array
-from model.files import reading_json
 
-VERSION = 3
-"""Of the set of cases and their files; a change of any number is another version."""
+VERSION = 3  # of the set of cases and their files; a change of any number is another version
 TOLERANCE = 1e-2
 """Error, in units of the case's scales, up to which an engine passes at the shortest step. A method
 of first order is wrong by about a step divided by the time that the motion takes to change, 1 ms by
@@ -28,19 +23,15 @@ of first order is wrong by about a step divided by the time that the motion take
 class ContactCase(Scene):
     """A scene and its exact motion."""
 
-    about: str
-    """What happens, in a sentence."""
-    times: Array = field(repr=False)
-    """Of the samples, (n,), s."""
+    about: str  # what happens, in a sentence
+    times: Array = field(repr=False)  # of the samples, (n,), s
     exact: Array = field(repr=False)
     """(n, 9): position, velocity and spin at those times; (n, 18) with those of `under`."""
     contacts: tuple[str, ...] = field(repr=False)
     """For each sample a letter a surface: R sticks or rolls, S slips, N does not touch, T stands on
     an edge of a body that turns; then one for what is `between` two bodies, or for a joint."""
-    bound: float
-    """Of the error of `exact`, in units of `scales`."""
-    source: str
-    """Where `exact` is from."""
+    bound: float  # of the error of `exact`, in units of `scales`
+    source: str  # where `exact` is from
     scales: tuple[float, float, float]
     """Of position (m), velocity (m/s) and spin (rad/s); infinite: not compared."""
     wrong: Mapping[str, Array] = field(default_factory=dict, repr=False)
@@ -139,33 +130,3 @@ def reach(body: Body, normal: Array) -> Array:
     if body.shape == "box":
         return np.asarray(np.abs(in_body_axes(body.orientation, normal)) @ np.array(body.size))
     return np.full(len(normal), body.size[0] + (body.size[2] if body.shape == "tripod" else 0.0))
-
-
-def read(path: Path) -> ContactCase:
-    """A case from a file that `dualball cases -o` wrote; without its wrong answers.
-
-    Raises
-    ------
-    StorageError
-        If the file can't be read, or lacks something.
-    InputError
-        If it is of another schema or version."""
-    with reading_json(path, "exact case") as data:
-        if (schema := data["schema"]) != "dualball-case":
-            why = f"its schema is {schema!r}, not 'dualball-case'"
-            raise InputError(f"{path} is no exact case: {why}")
-        if (written := data["version"]) not in range(1, VERSION + 1):
-            reads = f"this program reads 1 to {VERSION}"
-            raise InputError(f"{path} is of version {written!r} of the exact cases; {reads}")
-        names = {each.name for each in fields(ContactCase)} - {"wrong"}
-        own = {name: value for name, value in data.items() if name in names}
-        own["scales"] = [math.inf if scale is None else scale for scale in own["scales"]]
-        own["surfaces"] = [Surface(**_tuples(surface)) for surface in own["surfaces"]]
-        own |= {name: Body(**_tuples(own[name])) for name in ("body", "under") if own.get(name)}
-        arrays = {name: np.array(own[name], float) for name in ("times", "exact")}
-        return ContactCase(**_tuples(own) | arrays)
-
-
-def _tuples(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Data as JSON has it, with tuples for lists."""
-    return {name: tuple(v) if isinstance(v, list) else v for name, v in data.items()}
