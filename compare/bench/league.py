@@ -7,7 +7,7 @@ import math
 import statistics
 import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -26,43 +26,22 @@ if TYPE_CHECKING:
 _OWN = "compare.engines.adapters"
 
 
-class LeagueEntry(NamedTuple):
-    """An engine in one kind of settings: the best that are known, or as it comes."""
-
-    engine: str
-    where: str
-    """As Python imports it, package.module:member."""
-    as_it_comes: bool = False
-
-    @property
-    def name(self) -> str:
-        """As users call it."""
-        return f"{self.engine}-defaults" if self.as_it_comes else self.engine
-
-
-def _in_both_settings(engine: str) -> tuple[LeagueEntry, LeagueEntry]:
-    """Of an adapter that has `best` and `defaults`, whose module is named as the engine."""
-    where = f"{_OWN}.{engine.replace('-', '_')}"
-    return LeagueEntry(engine, f"{where}:best"), LeagueEntry(engine, f"{where}:defaults", True)
-
-
+_AS_IT_COMES = "-defaults"
+_NEWTON = ("kamino", "xpbd", "xpbd-defaults", "semiimplicit-defaults", "vbd-defaults")
 ENTRIES = {
-    entry.name: entry
-    for entry in (
-        LeagueEntry("mujoco", f"{_OWN}.mujoco_free:best"),
-        LeagueEntry("mujoco-plain", "compare.bench.joints:on_joints"),
-        LeagueEntry("mujoco", f"{_OWN}.mujoco_free:defaults", True),
-        LeagueEntry("siconos", f"{_OWN}.siconos:best"),
-        *itertools.chain.from_iterable(map(_in_both_settings, (*STUDIED, "mujoco-warp"))),
-        LeagueEntry("newton-kamino", f"{_OWN}.newton:kamino"),
-        LeagueEntry("newton-xpbd", f"{_OWN}.newton:xpbd"),
-        *(
-            LeagueEntry(f"newton-{name}", f"{_OWN}.newton:{name}_defaults", True)
-            for name in ("xpbd", "semiimplicit", "vbd")
-        ),
-    )
+    "mujoco": f"{_OWN}.mujoco_free:best",
+    "mujoco-plain": "compare.bench.joints:on_joints",
+    "mujoco-defaults": f"{_OWN}.mujoco_free:defaults",
+    "siconos": f"{_OWN}.siconos:best",
+    **{
+        f"{name}{kind}": f"{_OWN}.{name.replace('-', '_')}:{kind[1:] or 'best'}"
+        for name in (*STUDIED, "mujoco-warp")
+        for kind in ("", _AS_IT_COMES)
+    },
+    **{f"newton-{name}": f"{_OWN}.newton:{name.replace('-', '_')}" for name in _NEWTON},
 }
-"""By their names."""
+"""Engines in the best settings known or, NAME-defaults, as they come: where Python imports
+them from, package.module:member."""
 _UNDER_THE_LAW = (
     "mujoco is MuJoCo with free bodies under Coulomb's law, as mujoco-free of other commands; "
     "MuJoCo's own contacts are those of mujoco-plain and mujoco-defaults."
@@ -70,15 +49,9 @@ _UNDER_THE_LAW = (
 """What is to be quoted with its number."""
 KINDS = ("sticking", "rolling", "sliding", "landing")
 QUICK = (2e-3,)
-LEAST = 1e-8
-"""Smaller errors are drawn here."""
+LEAST = 1e-8  # smaller errors are drawn here
 ENTRY_MARKS = "osv^DPX*<>phd"
 ENTRY_COLOURS = "#0072B2 #D55E00 #009E73 #CC79A7 #E69F00 #56B4E9 #000000 #8C564B".split()
-
-
-def entry(name: str) -> LeagueEntry:
-    """The entry of a name; any other is where an engine of the user's own is."""
-    return ENTRIES.get(name) or LeagueEntry(name, name)
 
 
 def measure(
@@ -159,7 +132,7 @@ def ranked(league: Mapping[str, Sequence[Result]]) -> dict[str, Sequence[Result]
 
     def place(name: str) -> tuple[bool, float]:
         passed = statistics.mean(r.passed for r in league[name] if not r.skipped)
-        return entry(name).as_it_comes, -passed
+        return name.endswith(_AS_IT_COMES), -passed
 
     tried = [name for name, results in league.items() if any(not r.skipped for r in results)]
     return {name: league[name] for name in sorted(tried, key=place)}
@@ -234,7 +207,7 @@ def draw(league: Mapping[str, Sequence[Result]]) -> Figure:
         for name, results in ranked(league).items()
     }
     shown = {name: results for name, results in finite.items() if results}
-    engines = list(dict.fromkeys(entry(name).engine for name in shown))
+    engines = list(dict.fromkeys(name.removesuffix(_AS_IT_COMES) for name in shown))
     figure, panels = style.panels(9.0, 4.4 + 0.19 * len(shown), 2, 2, sharex=True, sharey=True)
     for axes, each in zip(panels.ravel(), KINDS, strict=True):
         for name, results in shown.items():
@@ -244,10 +217,10 @@ def draw(league: Mapping[str, Sequence[Result]]) -> Figure:
             known = np.isfinite(own[:, 1]).mean(0) > 0.5  # where the median is
             finite_ones = np.where(np.isfinite(own[:, 1:]), own, np.nan)[..., known]
             cost, error = np.nanmedian(finite_ones, axis=0)
-            number = engines.index(entry(name).engine)
+            number = engines.index(name.removesuffix(_AS_IT_COMES))
             mark, colour = (of[number % len(of)] for of in (ENTRY_MARKS, ENTRY_COLOURS))
             look = {"marker": mark, "color": colour, "ms": 5.5, "lw": 1}
-            look |= {"mfc": "white", "ls": ":"} if entry(name).as_it_comes else {}
+            look |= {"mfc": "white", "ls": ":"} if name.endswith(_AS_IT_COMES) else {}
             axes.plot(cost, np.maximum(error, LEAST), label=name, **look)
         axes.axhline(TOLERANCE, color="0.5", lw=0.8)
         axes.set(xscale="log", yscale="log", title=each)

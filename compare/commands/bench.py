@@ -34,7 +34,7 @@ def run_league(args: argparse.Namespace) -> int:
     from compare.campaign import progress
     from compare.figures.pictures import embedded, svg
 
-    chosen = {name: league.entry(name).where for name in args.engine or league.ENTRIES}
+    chosen = {name: league.ENTRIES.get(name, name) for name in args.engine or league.ENTRIES}
     modules = {
         name for name in chosen if re.search(r"\w[.:]\w", name) or Path(f"{name}.py").exists()
     }

@@ -85,7 +85,7 @@ def _league() -> dict[str, list[Result]]:
     def results(name: str) -> list[Result]:
         file = kept / f"{name}.pickle"
         if not file.exists():
-            (found,) = league.measure({name: league.ENTRIES[name].where}, None, 1, show).values()
+            (found,) = league.measure({name: league.ENTRIES[name]}, None, 1, show).values()
             file.write_bytes(pickle.dumps(found))
         return cast(list[Result], pickle.loads(file.read_bytes()))
 
@@ -104,8 +104,8 @@ def _league() -> dict[str, list[Result]]:
 
 def _errors(asked: bool) -> Rows:
     """Errors by case of the engines as they come, or of those in their best settings."""
-    found = ((league.ENTRIES[name], own) for name, own in _league().items())
-    return league.rows({of.engine: own for of, own in found if of.as_it_comes == asked})
+    found = ((name.partition("-defaults"), own) for name, own in _league().items())
+    return league.rows({engine: own for (engine, kind, _), own in found if bool(kind) == asked})
 
 
 TABLES: Tables = {
