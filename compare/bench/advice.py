@@ -14,16 +14,14 @@ import mujoco
 import numpy as np
 
 from compare.bench.contact_law import Array, SoftContacts, geom_names, parameters
-from compare.bench.settled import Rest
+from compare.bench.settled import Rest, Tell
 from mjsim import Coulomb
 from model.errors import few
 
 UNNAMED = {"solref": (0.02, 1.0), "solimp": (0.9, 0.95)}
 """MuJoCo's own values, which a geom has that says nothing of its own."""
-CHECKS = 3
-"""Of the changes that help, so many are tried, after which there is no advice."""
-MENTIONED = 8
-"""Most geoms that are named in what is to be pasted."""
+CHECKS = 3  # of the changes that help, so many are tried, after which there is no advice
+MENTIONED = 8  # most geoms that are named in what is to be pasted
 FAULTS = {
     "creep": ("creep", 1e6, "µm/s"),
     "depth": ("depth", 1e6, "µm"),
@@ -41,12 +39,10 @@ class Change:
     pair: str
     quantity: str
     before: float
-    after: float
-    """Predicted."""
+    after: float  # predicted
     own: tuple[str, ...] = ()
     """Geoms to be changed that have a value of their own, which no default reaches."""
-    found: float = math.nan
-    """Measured, if it was tried."""
+    found: float = math.nan  # measured, if it was tried
 
     @property
     def written(self) -> str:
@@ -111,16 +107,12 @@ class AtRest:
     data: Any
     settled: Rest
     contacts: SoftContacts
-    number: Array
-    """By which `data` has them."""
-    radius: Array
-    """Of the smaller body of each, m."""
+    number: Array  # by which `data` has them
+    radius: Array  # of the smaller body of each, m
     moves: Array
     found: Mapping[str, Array]
-    creep: float
-    """What passes for good, m/s."""
-    depth: Array | float
-    """What passes for good, of each, m."""
+    creep: float  # what passes for good, m/s
+    depth: Array | float  # what passes for good, of each, m
 
     @np.errstate(over="ignore")
     def harm(self, c: SoftContacts) -> dict[str, Array]:
@@ -143,13 +135,12 @@ def best_change(
     members: Sequence[int],
     harm: Mapping[str, float],
     calm: Callable[[Any], bool],
-    tell: Callable[[float], object],
+    tell: Tell,
 ) -> tuple[Change | None, dict[str, Array]]:
     """The first option, in its mildest value, that makes all contacts good, or helps most.
 
     Also the harm that is left then. `pair` is the worst one, `members` are its contacts, `harm` is
-    its own; `calm` says whether a changed model settles as well; `tell` is called with the
-    fraction of options that were tried."""
+    its own; `calm` says whether a changed model settles as well."""
     c, what, tried = scene.contacts, max(harm, key=lambda fault: harm[fault]), []
     part = np.isin(np.arange(len(scene.number)), members)
     now = _worst(c, part, what)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,8 +20,8 @@ from compare.bench.contact_law import LARGEST, Array, contacts, geom_names, repl
 from compare.bench.settled import (
     WINDOW,
     Advance,
-    Control,
     Rest,
+    Tell,
     UnsettledError,
     awake,
     loads_by_pair,
@@ -29,28 +29,23 @@ from compare.bench.settled import (
     radii,
     settle,
     step_to_most_contacts,
-    with_control,
 )
 from compare.campaign.progress import part
 from model import InputError
 from model.errors import few
 
-DEPTH = 0.01
-"""What passes for good unless said, in radii of the smaller body."""
+DEPTH = 0.01  # what passes for good unless said, in radii of the smaller body
 SECOND, CHECKED = 1.0, 3.0
 """How long what moves is measured, s; and within how many a changed model must settle."""
-SHOWN = 12
-"""The worst pairs, which are shown."""
+SHOWN = 12  # the worst pairs, which are shown
 
 
 @dataclass(frozen=True)
 class Tolerances:
     """What passes for good."""
 
-    creep: float = 1e-5
-    """m/s."""
-    depth: float | None = None
-    """m; None: `DEPTH` times a body's radius."""
+    creep: float = 1e-5  # m/s
+    depth: float | None = None  # m; None: `DEPTH` times a body's radius
 
 
 @dataclass(frozen=True)
@@ -62,36 +57,27 @@ class PairForecast:
     predicted: nan."""
 
     name: str
-    members: tuple[int, ...]
-    """Its contacts, by number among all."""
+    members: tuple[int, ...]  # its contacts, by number among all
     moves: bool
-    parts: bool
-    """Whether any joint can part it."""
-    load: float
-    """N."""
+    parts: bool  # whether any joint can part it
+    load: float  # N
     depth: float
     depth_measured: float
-    creep: float
-    """m/s; nan if the pair slides, or has no friction."""
+    creep: float  # m/s; nan if the pair slides, or has no friction
     creep_measured: float
-    turning: float
-    """Creep of spinning and rolling friction, rad/s; nan if the pair has none."""
+    turning: float  # creep of spinning and rolling friction, rad/s; nan if the pair has none
     turning_measured: float
-    cone: float
-    """Share of the friction cone, or pyramid, in use."""
+    cone: float  # share of the friction cone, or pyramid, in use
     short: float
     """Share of Coulomb's friction that the pyramid lacks in the direction of the load or, if the
     pair slides or moves, against its slip, of all its contacts; nan for an elliptic cone, and where
     next to no friction acts."""
     slides: bool
-    hover: float
-    """Slip speed from which contact is lost again and again, m/s."""
-    largest_step: float
-    """Largest stable time step, s; inf if there is none below one second."""
+    hover: float  # slip speed from which contact is lost again and again, m/s
+    largest_step: float  # largest stable time step, s; inf if there is none below one second
     replaced: Mapping[str, str]
     """What the engine takes in the place of what the model says: kinds, and how."""
-    harm: Mapping[str, float]
-    """For each of `advice.FAULTS`, how many times what passes for good."""
+    harm: Mapping[str, float]  # for each of `advice.FAULTS`, how many times what passes for good
 
 
 @dataclass(frozen=True)
@@ -100,14 +86,11 @@ class Forecast:
 
     pairs: tuple[PairForecast, ...]
     timestep: float
-    largest_step: float
-    """Of all contacts together, s."""
+    largest_step: float  # of all contacts together, s
     settled: Rest
-    flexible: int
-    """Contacts of flexible bodies, which are left out."""
+    flexible: int  # contacts of flexible bodies, which are left out
     change: advice.Change | None = None
-    remedy: str = ""
-    """Lines of Python that hold what still creeps harmfully; empty: nothing does."""
+    remedy: str = ""  # lines of Python that hold what still creeps harmfully; empty: nothing does
 
     @property
     def unsettled(self) -> str:
@@ -123,22 +106,20 @@ def forecast(
     data: Any,
     settled: Rest,
     tolerances: Tolerances = Tolerances(),
-    control: Control | None = None,
-    tell: Callable[[float], object] = float,
+    step: Advance = mujoco.mj_step,
+    tell: Tell = float,
 ) -> Forecast:
     """The forecast for a model as `settle` has left it; `data` is left at its end.
 
-    `control` is run before each step; `tell` is called with the fraction done. Raises `InputError`
-    if nothing touches, `UnsettledError` if the model diverges."""
-    step, measuring = with_control(control), part(tell, 0, 1 / 4)
-    scene = _measured(model, data, settled, step, tolerances, measuring)
+    Raises `InputError` if nothing touches, `UnsettledError` if the model diverges."""
+    scene = _measured(model, data, settled, step, tolerances, part(tell, 0, 1 / 4))
     found = _without_advice(scene)
     worst = found.pairs[0]
 
     def calm(other: Any) -> bool:
         """Whether a changed model settles as well: contacts may chatter."""
         try:
-            found = settle(other, copy.copy(scene.data), CHECKED, control)
+            found = settle(other, copy.copy(scene.data), CHECKED, step)
             return len(found.moving) <= len(settled.moving)
         except UnsettledError:
             return False
@@ -156,30 +137,29 @@ def follow_advice(
     before: Forecast,
     limit: float,
     tolerances: Tolerances = Tolerances(),
-    tell: Callable[[float], object] = float,
+    tell: Tell = float,
 ) -> tuple[Forecast, Forecast | None, Forecast | None]:
     """Follow the advice and settle anew, for at most `limit` s: forecasts before, after, beyond.
 
-    The second forecast is that after the change, the third that with the remedy on top.
-    What isn't advised isn't tried: None. The change is made in `model`. `tell` is called with the
-    fraction done. Raises as `forecast` does."""
+    The second forecast is that after the change, which is made in `model`, the third that with the
+    remedy on top; None of what isn't advised. Raises as `forecast` does."""
     after = held = None
+
+    def again(model: Any, data: Any, step: Advance, tell: Tell) -> Forecast:
+        rest = settle(model, data, limit, step, part(tell, 0, 1 / 2))
+        scene = _measured(model, data, rest, step, tolerances, part(tell, 1 / 2, 1))
+        return _without_advice(scene)
+
     if change := before.change:
         advice.apply(model, change.option, change.value)
-        rest = settle(model, data, limit, tell=part(tell, 0, 1 / 4))
-        measuring = part(tell, 1 / 4, 1 / 2)
-        scene = _measured(model, data, rest, mujoco.mj_step, tolerances, measuring)
-        after = _without_advice(scene)
+        after = again(model, data, mujoco.mj_step, part(tell, 0, 1 / 2))
         measured = "_measured" if change.quantity in ("creep", "depth") else ""
         those = [pair for pair in after.pairs if pair.name == change.pair]
         found = [getattr(pair, f"{change.quantity}{measured}") for pair in those]
         change = replace(change, found=max(found, default=math.nan))
         before = replace(before, change=change)
     if before.remedy:
-        twin, state, law = advice.remedied(model, data)
-        rest = settle(twin, state, limit, law=law, tell=part(tell, 1 / 2, 3 / 4))
-        scene = _measured(twin, state, rest, law, tolerances, part(tell, 3 / 4, 1))
-        held = _without_advice(scene)
+        held = again(*advice.remedied(model, data), part(tell, 1 / 2, 1))
         pairs = (replace(p, creep=0 * p.creep, turning=0 * p.turning) for p in held.pairs)
         held = replace(held, pairs=tuple(pairs))
     return before, after, held
@@ -191,7 +171,7 @@ def _measured(
     settled: Rest,
     step: Advance,
     tolerances: Tolerances,
-    tell: Callable[[float], object],
+    tell: Tell,
 ) -> advice.AtRest:
     """The contacts of a settled model and what was measured; `data` is at its end."""
     model, moving = awake(model), settled.moving

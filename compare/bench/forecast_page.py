@@ -13,12 +13,9 @@ from compare.bench.settled import NOISE
 from compare.figures import pages
 from model.errors import few
 
-SLIGHT = 0.05
-"""Share of Coulomb's friction that a pyramid may lack without a word."""
-CREEP_OFF = 0.05
-"""Share of the predicted creep by which the measured one may differ without a word."""
-Table = tuple[str, list[list[str]]]
-"""Its title and its rows, a head first."""
+SLIGHT = 0.05  # share of Coulomb's friction that a pyramid may lack without a word
+CREEP_OFF = 0.05  # share of the predicted creep by which the measured one may differ without a word
+Table = tuple[str, list[list[str]]]  # its title and its rows, a head first
 
 
 def _cures(f: Forecast) -> Iterator[str]:
@@ -73,7 +70,7 @@ def sentences(f: Forecast) -> Iterator[str]:
     if f.settled.collapsed:
         yield (
             f"Collapsed since the start: {few(f.settled.collapsed)}. The table is of how it lies. "
-            "To hold it up: --ctrl, --keyframe, or in Python control."
+            "To hold it up: --ctrl, --keyframe, or in Python a step of your own."
         )
     if moving:
         yield f"Not settled: {few(moving)}."

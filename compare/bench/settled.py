@@ -21,22 +21,18 @@ from model.errors import few
 from model.files import why_no_file
 from model.parameters import ANY, Range, check_number, parse_number
 
-Control = Callable[[Any, Any], None]
-"""Sets `data.ctrl`, or any force, of a model and its data, maybe copies, before a step."""
 Advance = Callable[[Any, Any, int], None]
-"""Advances the data of a model by a number of steps, as `mujoco.mj_step` does."""
+"""Advances the data of a model, maybe a copy, by a number of steps, as `mujoco.mj_step` does."""
+Tell = Callable[[float], object]  # is called with the fraction done
 STEADY, STILL = 2e-3, 1e-8
 """A speed that changes by no more than this share, or this (m/s), in a window has settled."""
 MOST_POINTS = 25_000_000
 """Of a heightfield or texture: 5000 by 5000, some 200 MB while it is compiled."""
-NOISE = 1e-6
-"""Speeds that are not told apart, m/s."""
+NOISE = 1e-6  # speeds that are not told apart, m/s
 RESTLESS, JOLT, TURNING = 0.3, 1e-3, 0.05
 """A body moves on if its speed changes by this share, or this (m/s), or it turns so, rad."""
-WINDOW, WINDOW_STEPS = 0.1, 50
-"""A window is so long, s, and of so many steps."""
-SHORTEST = 1e-7
-"""Of a time step, s: a million in a window."""
+WINDOW, WINDOW_STEPS = 0.1, 50  # a window is so long, s, and of so many steps
+SHORTEST = 1e-7  # of a time step, s: a million in a window
 BENT, SUNK = 0.3, 0.1
 """A robot has collapsed if a driven joint turned so, rad, and it sank by this share of its size."""
 BAD = [getattr(mujoco.mjtWarning, f"mjWARN_BADQ{name}") for name in ("POS", "VEL", "ACC")]
@@ -51,14 +47,10 @@ class UnsettledError(RuntimeError):
 class Rest:
     """What a model has settled to; bodies in words."""
 
-    steady: bool
-    """Whether no speed changes any more but by little."""
-    moving: Mapping[int, str]
-    """Bodies that have not settled, by number."""
-    collapsed: tuple[str, ...]
-    """Robots that are not as they began."""
-    asleep: tuple[str, ...]
-    """Bodies that MuJoCo would freeze now."""
+    steady: bool  # whether no speed changes any more but by little
+    moving: Mapping[int, str]  # bodies that have not settled, by number
+    collapsed: tuple[str, ...]  # robots that are not as they began
+    asleep: tuple[str, ...]  # bodies that MuJoCo would freeze now
 
 
 def load(path: Path, keyframe: str | None = None) -> tuple[Any, Any]:
@@ -73,9 +65,13 @@ def load(path: Path, keyframe: str | None = None) -> tuple[Any, Any]:
     except UnicodeDecodeError as error:
         raise StorageError(f"cannot read {path}: MuJoCo takes no name but in UTF-8") from error
     try:
-        _check_sizes(_heightfields(path))
-        _check_sizes(_sizes(mujoco.MjSpec.from_file(name)))
-        model = mujoco.MjModel.from_xml_path(name)
+        _check_heightfields(path)
+        spec = mujoco.MjSpec.from_file(name)  # with included files, and defaults
+        for each in spec.hfields:
+            _check_size("heightfield", each.name, each.nrow, each.ncol)
+        for each in spec.textures:
+            _check_size("texture", each.name, each.width, each.height)
+        model = spec.compile()
         check_number("timestep", model.opt.timestep, "s", Range(SHORTEST))
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
@@ -94,37 +90,25 @@ def load(path: Path, keyframe: str | None = None) -> tuple[Any, Any]:
     return model, data
 
 
-Sizes = dict[str, tuple[int, int]]
-"""Rows and columns of what a model is made of."""
+def _check_size(what: str, name: str | None, rows: int, columns: int) -> None:
+    """`InputError` for what a line of MJCF can ask for and no memory holds."""
+    if rows * columns > MOST_POINTS:
+        raise InputError(
+            f"{what} {name!r} has {rows} x {columns} points; {MOST_POINTS:g} are the most that are "
+            "taken"
+        )
 
 
-def _heightfields(path: Path) -> Sizes:
-    """Those of the file itself: MuJoCo makes room for them while it reads."""
+def _check_heightfields(path: Path) -> None:
+    """`InputError` for a huge one in the file itself: MuJoCo makes room for it while it reads."""
     try:
         found = ElementTree.parse(path).iter("hfield")
     except (ElementTree.ParseError, LookupError, ValueError):
-        return {}  # MuJoCo says what is wrong
-    sizes = {each.get("name"): (each.get("nrow", ""), each.get("ncol", "")) for each in found}
-    return {
-        f"heightfield {name!r}": (int(rows), int(columns))
-        for name, (rows, columns) in sizes.items()
-        if rows.isdecimal() and columns.isdecimal()
-    }
-
-
-def _sizes(spec: Any) -> Sizes:
-    """Those of what MuJoCo has read, included files and defaults with it."""
-    sizes = {f"heightfield {each.name!r}": (each.nrow, each.ncol) for each in spec.hfields}
-    return sizes | {f"texture {each.name!r}": (each.width, each.height) for each in spec.textures}
-
-
-def _check_sizes(sizes: Sizes) -> None:
-    """`InputError` for what a line of MJCF can ask for and no memory holds."""
-    for what, (rows, columns) in sizes.items():
-        if rows * columns > MOST_POINTS:
-            raise InputError(
-                f"{what} has {rows} x {columns} points; {MOST_POINTS:g} are the most that are taken"
-            )
+        return  # MuJoCo says what is wrong
+    for each in found:
+        rows, columns = each.get("nrow", ""), each.get("ncol", "")
+        if rows.isdecimal() and columns.isdecimal():
+            _check_size("heightfield", each.get("name"), int(rows), int(columns))
 
 
 def set_controls(model: Any, data: Any, values: Sequence[str]) -> None:
@@ -152,19 +136,6 @@ def set_controls(model: Any, data: Any, values: Sequence[str]) -> None:
         data.ctrl[k] = parse_number(f"--ctrl: {name}", text, "1", allowed)
 
 
-def with_control(control: Control | None, step: Advance = mujoco.mj_step) -> Advance:
-    """A law of stepping that runs a controller before each step."""
-    if control is None:
-        return step
-
-    def controlled(model: Any, data: Any, nstep: int) -> None:
-        for _ in range(nstep):
-            control(model, data)
-            step(model, data, 1)
-
-    return controlled
-
-
 def awake(model: Any) -> Any:
     """The model, or a copy of it in which MuJoCo puts no body to sleep."""
     sleep = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
@@ -178,15 +149,13 @@ def settle(
     model: Any,
     data: Any,
     limit: float,
-    control: Control | None = None,
-    law: Advance = mujoco.mj_step,
-    tell: Callable[[float], object] = float,
+    step: Advance = mujoco.mj_step,
+    tell: Tell = float,
 ) -> Rest:
     """Advance until velocities no longer change, for at most `limit` s; nothing sleeps meanwhile.
 
-    `law` steps in the place of `mj_step`; `tell` is called with the fraction done, about. Raises
-    `UnsettledError` if the model diverges."""
-    sleepy, model, step = model, awake(model), with_control(control, law)
+    Raises `UnsettledError` if the model diverges."""
+    sleepy, model = model, awake(model)
     mujoco.mj_forward(model, data)
     first, radius = copy.copy(data), radii(model)
     scale = np.where(np.isfinite(radius), radius, 0)[:, None] ** [0, 0, 0, 1, 1, 1]
