@@ -24,16 +24,14 @@ RADIUS, BLOCK, MU = 0.1, (0.1, 0.1, 0.05), 0.5
 """Radius of spheres and half edges of blocks, m; they weigh 1 kg; friction of most surfaces."""
 CLOSED_FORMS: list[Callable[[], ContactCase]] = []
 """Functions that make these cases, in the order in which they are listed."""
-CLOSED = 1e-14
-"""Round-off of a closed form, in units of the scales."""
+CLOSED = 1e-14  # round-off of a closed form, in units of the scales
 SPEED_ALONE = (math.inf, 0.01, math.inf)
 """Of a body that must not move: a creep of 0.1 mm/s passes; how far it sinks in is left out."""
 UP, WAY = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
 """The vertical, and the way of what goes along a level floor."""
 Motion = tuple[Array, ...]
 """Position, velocity and spin, each (n, 3); then those of a body under the first."""
-Course = Callable[..., Motion]
-"""The motion at times (n,) in s."""
+Course = Callable[..., Motion]  # the motion at times (n,) in s
 
 
 def closed_form(
@@ -176,8 +174,7 @@ def _pulled_ever_harder(t: Array, mu: float = MU, grip: float = 1.0) -> Motion:
                  BLOCK[2] * UP)
 
 
-_PUSH = G / (0.5 * MU)
-"""Force at which half of the friction of a wall carries a block, N."""
+_PUSH = G / (0.5 * MU)  # force at which half of the friction of a wall carries a block, N
 
 
 @_case(
@@ -250,8 +247,7 @@ def _spins_on_the_spot(t: Array, decay: float = 0.0) -> Motion:
     return RADIUS * UP, np.zeros(3), np.outer(20.0 * np.exp(-decay * t), UP)
 
 
-_TURNING = 3.0
-"""Of the turntable, rad/s."""
+_TURNING = 3.0  # of the turntable, rad/s
 
 
 @_case(
@@ -315,8 +311,7 @@ def _descends(t: Array, angle: float, lever: float = 2 * J, mu: float = 9.0) -> 
     return along(way, a * t**2 / 2, a * t, spin, RADIUS / math.sqrt(0.5) * np.array(normal))
 
 
-_PINCHED = math.atan(0.9 * 0.5 / math.sqrt(0.5))
-"""A groove in which a cube stays."""
+_PINCHED = math.atan(0.9 * 0.5 / math.sqrt(0.5))  # a groove in which a cube stays
 _IN_GROOVE = "Newton and Euler; by symmetry both planes carry m g cos/sqrt(2)"
 _TURN, _ACROSS = _PINCHED / 2, math.pi / 8
 _CUBE = {

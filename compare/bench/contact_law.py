@@ -20,12 +20,10 @@ import numpy.typing as npt
 import scipy.linalg
 import scipy.sparse
 
-Array = npt.NDArray[Any]
-"""Of floats, or of marks and numbers that choose contacts."""
+Array = npt.NDArray[Any]  # of floats, or of marks and numbers that choose contacts
 LARGEST, CONE = 1.0, 0.999
 """Steps are tried up to this, s; from this share of the cone on a contact slides."""
-IDLE = 0.01
-"""Friction that uses no more than this share of Coulomb's cone is given no direction."""
+IDLE = 0.01  # friction that uses no more than this share of Coulomb's cone is given no direction
 FAINT = 1e-3
 """A load that could speed up the lighter body by less than this share of g counts as none."""
 SOLREF = (0.02, 1.0)
@@ -42,22 +40,16 @@ class SoftContacts:
     integrator: int
     noslip: bool
     refsafe: bool
-    solref: Array
-    """Shape (n, 2); also that of `solreffriction`, in which zeros mean: as `solref`."""
+    solref: Array  # shape (n, 2); also that of `solreffriction`, in which zeros mean: as `solref`
     solreffriction: Array
-    solimp: Array
-    """Shape (n, 5)."""
+    solimp: Array  # shape (n, 5)
     geoms: Array
     dim: Array
-    friction: Array
-    """Shape (n, 5): two of slipping, spinning, two of rolling; m for the last three."""
-    inverse_mass: Array
-    """What a normal row sees by the engine's estimate, 1/kg."""
+    friction: Array  # shape (n, 5): two of slipping, spinning, two of rolling; m for the last three
+    inverse_mass: Array  # what a normal row sees by the engine's estimate, 1/kg
     margin: Array
-    force: Array
-    """Shape (n, 6): along the normal and the directions of `friction`, N and N m."""
-    slip: Array
-    """Shape (n, 5): as found, m/s and rad/s."""
+    force: Array  # shape (n, 6): along the normal and the directions of `friction`, N and N m
+    slip: Array  # shape (n, 5): as found, m/s and rad/s
     rows: Array
     """Jacobian, shape (n, 6, nv), in units in which the mass matrix is one; zeros beyond `dim`."""
 
@@ -269,10 +261,8 @@ class ContactResponse:
     turning: Array
     hover: Array
     slides: Array
-    weight: Array
-    """Force per acceleration of each row, kg."""
-    stiffness: Array
-    """Of small motions: impedance grows with depth."""
+    weight: Array  # force per acceleration of each row, kg
+    stiffness: Array  # of small motions: impedance grows with depth
     damping: Array
 
 

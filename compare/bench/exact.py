@@ -28,10 +28,8 @@ from model.versions import current_versions
 SLOW = Parameters.named("reference").replace(omega_0=12.0)
 ROUGH = Parameters.named("high-wall-friction").replace(omega_0=25.0)
 README = Path(__file__).with_name("templates") / "cases.md"
-SHARP = 1e-13
-"""Relative tolerance of the event-driven simulation."""
-BOUND = 1e-10
-"""Of what it then is wrong by: a hundred times what ten times the tolerance changes."""
+SHARP = 1e-13  # relative tolerance of the event-driven simulation
+BOUND = 1e-10  # of what it then is wrong by: a hundred times what ten times the tolerance changes
 
 
 @cache

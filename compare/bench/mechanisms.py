@@ -94,8 +94,7 @@ def tripod(t: Array, mu: float = 0.3, height: float = _FOOT + _DOWN, share: floa
     return vectors(x, y, _FOOT + _DOWN), vectors(v_x, v_y, 0.0), np.outer(rate, UP)
 
 
-_PLANK = (0.6, 0.2, 0.02)
-"""Half edges of the plank, m."""
+_PLANK = (0.6, 0.2, 0.02)  # half edges of the plank, m
 _ABOVE, _BELOW, _SPEED, _HEAVIER = 0.4, 0.1, 2.0, 2.0
 """Friction on and under it, speed of the block at first, m/s, and mass of the plank, kg."""
 _MEET = _SPEED / (_ABOVE * G + (_ABOVE - _BELOW * (_HEAVIER + 1)) * G / _HEAVIER)
@@ -154,8 +153,7 @@ def _stays(t: Array, mu: float = 0.5) -> Motion:
     return *along(way, s, v, 0 * t, high), *along(way, s, v, 0 * t, low)
 
 
-_INCLINE, _DOWNHILL = math.atan(0.3), 0.8
-"""Of the belt; speed of the block at first, m/s."""
+_INCLINE, _DOWNHILL = math.atan(0.3), 0.8  # of the belt; speed of the block at first, m/s
 
 
 @_case(

@@ -37,8 +37,7 @@ from model.arrays import Array
 OBLIQUE: list[Callable[[], ContactCase]] = []
 """Functions that make these cases, in the order in which they are listed."""
 _case = partial(case, OBLIQUE)
-_SPEED = 2.0
-"""Of what is pushed off, m/s."""
+_SPEED = 2.0  # of what is pushed off, m/s
 _PYRAMID = "a pyramid with its edges along the axes"
 _WRONG = {
     "friction 5 % too weak": {"mu": 0.95 * MU},
@@ -118,8 +117,7 @@ for _degrees in (30.0, 45.0):
         wrong=_WRONG,
         until=1.0, scales=(0.5, 1.0, math.inf), contacts=("S",), source=_strong)
 
-_ALONG, _ACROSS = 0.3, 0.6
-"""Friction along x and along y."""
+_ALONG, _ACROSS = 0.3, 0.6  # friction along x and along y
 
 
 @_case(
@@ -151,10 +149,8 @@ def _turns_aside(
 
 _BALL_MU, _TOP, _SIDE = 0.2, 15.0, 20.0
 """Friction under the ball, and its spin at first about x and about the vertical, rad/s."""
-_FIRST = np.array([_SPEED, RADIUS * _TOP, 0.0])
-"""Slip of the ball at first, m/s."""
-_ROLLS = float(np.linalg.norm(_FIRST)) / (_BALL_MU * G * (1 + 1 / J))
-"""When it no longer slips, s."""
+_FIRST = np.array([_SPEED, RADIUS * _TOP, 0.0])  # slip of the ball at first, m/s
+_ROLLS = float(np.linalg.norm(_FIRST)) / (_BALL_MU * G * (1 + 1 / J))  # when it no longer slips, s
 
 
 @_case(

@@ -2,19 +2,17 @@
 
 An engine is anything with three functions, a module most simply:
 
-* ``build(case, timestep)`` makes the scene of a `Case` anew, its body at the start;
-* ``step(n)`` takes n steps of that length, setting ``case.force(t, position, velocity)`` before
-  each where ``case.forced``;
-* ``state()`` returns position, velocity and spin of the body, three numbers each, in SI units and
-  world axes, then those of the one under it, if there is one.
+* ``build(case, timestep)`` makes the scene of a case anew, or raises `NotImplementedError` with the
+  reason why it can't;
+* ``step(n)`` takes n steps, setting ``case.force(t, position, velocity)`` before each where
+  ``case.forced``;
+* ``state()`` returns position, velocity and spin of the body in SI units and world axes, then those
+  of the one under it, if there is one.
 
-``build`` raises `NotImplementedError` with the reason for a case that the engine can't express. It
-is not asked for cases that need what version 1 of them had not (`ContactCase.needs`) unless its
-``FEATURES`` name that. It may say of itself: ``NAME``, ``PRECISION`` (``f64`` or ``f32``),
-``DECLARED`` (in words, all that isn't a free body in plain geometry under the engine's own
-settings), ``NOTE`` (what is worst and why, in a sentence), ``TIMESTEPS`` (its own instead of
-`TIME_STEPS`), ``KNOWN`` (package and version with which it is known to work, ``"mujoco 4.0.0"``),
-``MISSING`` (why it can't be used here)."""
+It may say of itself ``NAME``; ``PRECISION``, ``f64`` or ``f32``; ``FEATURES`` of `Scene.needs` that
+it has; ``DECLARED``, all that isn't a free body in plain geometry under the engine's own settings;
+``NOTE``, what is worst and why; ``TIMESTEPS`` in the place of `TIME_STEPS`; ``KNOWN``, package and
+version with which it works, ``"mujoco 4.0.0"``; ``MISSING``, why it can't be used here."""
 
 from __future__ import annotations
 
@@ -43,14 +41,11 @@ from model.arrays import Array
 from model.parameters import POSITIVE, check_choice, check_number
 from model.versions import ABSENT, absent, version
 
-LIMIT = 300.0
-"""Longest that a run at one step may take, s of real time."""
-BEGIN = 120.0
-"""Longest that an engine may take to load, s."""
+LIMIT = 300.0  # longest that a run at one step may take, s of real time
+BEGIN = 120.0  # longest that an engine may take to load, s
 LIFTED = 1e-3
 """Gap, in units of the body's least size, from which a contact that should last counts as lost."""
-FLOORS = {"f64": 1e-11, "f32": 1e-5}
-"""Errors that are only round-off; there is no order in them."""
+FLOORS = {"f64": 1e-11, "f32": 1e-5}  # errors that are only round-off; there is no order in them
 FUNCTIONS = ("build", "step", "state")
 TOLD = {"precision": "PRECISION", "declared": "DECLARED", "note": "NOTE", "steps": "TIMESTEPS"}
 TOLD |= {"features": "FEATURES", "missing": "MISSING"}
@@ -64,15 +59,12 @@ class About:
     name: str
     precision: str = "f64"
     declared: str = ""
-    note: str = ""
-    """What is worst, and why, in a sentence."""
+    note: str = ""  # what is worst, and why, in a sentence
     version: str = ""
     """Of its package, and the version with which it is known to work if that is another."""
     steps: tuple[float, ...] = TIME_STEPS
-    features: tuple[str, ...] = ()
-    """Of `ContactCase.needs`, what it can do."""
-    missing: str = ""
-    """Why it can't be used here; empty if it can."""
+    features: tuple[str, ...] = ()  # of `ContactCase.needs`, what it can do
+    missing: str = ""  # why it can't be used here; empty if it can
 
 
 @dataclass(frozen=True)
@@ -252,7 +244,7 @@ def _load(given: Any) -> tuple[Any, About]:
             if package and version(package) == ABSENT:
                 return None, About(str(given), missing=absent(package))
             works = f" ({known})" if known else ""
-            raise InputError(f"{type(error).__name__}: {_one_line(error)}{works}") from error
+            raise InputError(f"{_in_words(error)}{works}") from error
     name = getattr(engine, "NAME", getattr(engine, "__name__", type(engine).__name__))
     lacking = [function for function in FUNCTIONS if not callable(getattr(engine, function, None))]
     if lacking:
@@ -276,8 +268,8 @@ def _package(given: Any, engine: Any) -> tuple[str, str]:
     return package, f"{package} {here}".strip() + other
 
 
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split())[:200]
+def _in_words(error: Exception) -> str:
+    return f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
 
 
 def serve_engine(handle: int) -> None:
@@ -330,5 +322,5 @@ def _attempt(engine: Any, case: ContactCase, step: float) -> Any:
     except NotImplementedError as error:
         return NotImplementedError(str(error))
     except Exception as error:  # whatever an engine throws loses the case alone
-        return None, math.nan, f"{type(error).__name__}: {_one_line(error)}"
+        return None, math.nan, _in_words(error)
     return states, spent / float(case.times[-1]), ""

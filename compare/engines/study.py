@@ -30,12 +30,9 @@ class Role(Enum):
     """How an engine is asked of a claim, and which sets it measures, see `compare.plan`."""
 
     ON_TRIAL = auto()
-    IN_THE_LIMIT = auto()
-    """In the zero-step limit, beside the one on trial."""
-    AS_IT_COMES = auto()
-    """With its own settings and step, beside the one on trial."""
-    FREE_BODY = auto()
-    """The ball as a free body, beside the one on trial: are its joints to blame?"""
+    IN_THE_LIMIT = auto()  # in the zero-step limit, beside the one on trial
+    AS_IT_COMES = auto()  # with its own settings and step, beside the one on trial
+    FREE_BODY = auto()  # the ball as a free body, beside the one on trial: are its joints to blame?
 
 
 AnySettings = RigidContacts | ContactSettings | analytic.Settings | vessel.Settings
@@ -54,39 +51,31 @@ class Engine:
 
     name: str
     settings: type[AnySettings]
-    options: tuple[str, ...]
-    """Options of the command line that `configure` takes."""
+    options: tuple[str, ...]  # options of the command line that `configure` takes
     configure: Callable[[Mapping[str, float], Parameters], AnySettings]
     """Settings of a user's run from such options; those not given have their defaults."""
     check_run: Callable[[Any], object]
     """`InputError` for a `campaign.tasks.Task` that can't begin, before it is carried out."""
     simulate: Simulate | None = None
     stream: Stream | None = None
-    sources: tuple[str, ...]
-    """Packages whose sources determine the results."""
-    stands_on: tuple[str, ...]
-    """Packages whose versions do."""
-    torque: bool = False
-    """Whether it takes `Parameters.fluid_torque`."""
-    lands_within: float = 1.0
-    """Part of a time step within which it finds when a contact closes."""
+    sources: tuple[str, ...]  # packages whose sources determine the results
+    stands_on: tuple[str, ...]  # packages whose versions do
+    torque: bool = False  # whether it takes `Parameters.fluid_torque`
+    lands_within: float = 1.0  # part of a time step within which it finds when a contact closes
     lag: float = 3.0
     """Time steps by which a contact force lags behind its load: of a ball set on floor and wall
     MuJoCo's own contacts find it in the fourth step."""
     needs: Library | None = None
     """An optional library that it needs; the version of that is one of `versions`."""
-    title: str = ""
-    """What it is, in a few words."""
-    about: str = ""
-    """What makes it so, as the report's first screen says it."""
+    title: str = ""  # what it is, in a few words
+    about: str = ""  # what makes it so, as the report's first screen says it
     role: Role = Role.ON_TRIAL
     divisors: tuple[int, ...] = (1,)
     """Time steps in one that a protocol asks for; several: judged in the zero-step limit."""
     relative_tolerance: float = 0.0
     """Share of its scale by which a number may be off, chosen before anything was measured so; 0
     where each measurement has a tolerance of its own."""
-    mark: str
-    """Marker of matplotlib."""
+    mark: str  # marker of matplotlib
 
     @property
     def missing(self) -> str:
@@ -134,14 +123,12 @@ def plain(step: float) -> ContactSettings:
 
 def _unwarned(*given: Any, **more: Any) -> mjsim.Run:
     """`mjsim.Run` without its warnings."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # that contacts may chatter with these settings is on trial
+    with warnings.catch_warnings(action="ignore"):  # that contacts may chatter so is on trial
         return mjsim.Run(*given, **more)
 
 
 def _check_stream(task: Any) -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the run itself warns, once
+    with warnings.catch_warnings(action="ignore"):  # the run itself warns, once
         mjsim.engine.check_run(
             task.parameters, task.x0, task.t_end, task.fluid, task.settings, task.sample_interval
         )

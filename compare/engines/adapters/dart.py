@@ -37,7 +37,7 @@ class Dart(Free):
             solver.setBoxedLcpSolver(self.cone)
             solver.setSplitImpulseEnabled(True)
         self.driven: list[tuple[Any, float]] = []
-        self.surfaces: dict[str, int] = {}
+        self.surfaces = {}
         for surface, name, point, normal in self.planes():
             skeleton = bodies.Skeleton(name)
             self.surfaces[name] = scene.surfaces.index(surface)
@@ -116,13 +116,12 @@ class Dart(Free):
     def touches(self) -> list[Touch]:
         shown = []
         for contact in self.world.getLastCollisionResult().getContacts():
-            names = [
+            first, second = (
                 each.getShapeFrame().asShapeNode().getSkeleton().getName()
                 for each in (contact.collisionObject1, contact.collisionObject2)
-            ]
-            sign = 1 if names[1] in self.surfaces else -1  # it acts on the first object
-            surface = self.surfaces[names[1 if sign > 0 else 0]]
-            shown.append(Touch(surface, sign * np.array(contact.force), -contact.penetrationDepth))
+            )
+            on_first, gap = np.array(contact.force), -contact.penetrationDepth
+            shown.append(self.touch(second, first, on_first, gap))
         return shown
 
 

@@ -29,12 +29,9 @@ STIFFNESS, DISSIPATION, STICTION = 1e7, 100.0, 1e-8
 at up to the reciprocal of the dissipation: with less it is thrown back, with more it stays sunk in
 for long. Where the wall is placed anew before each step a hundred times the stiffness makes the
 contact chatter, and TAMSI fail."""
-HEAVY = 1e6
-"""Mass of a wall that moves, divided by the body's: nothing slows it."""
-ROUND = 1e6
-"""Moment of inertia of a surface that moves, divided by its mass, m2: nothing turns it."""
-SIZE = 100.0
-"""Edge of the cubes of which a vessel of many facets is made, in units of its radius."""
+HEAVY = 1e6  # mass of a wall that moves, divided by the body's: nothing slows it
+ROUND = 1e6  # moment of inertia of a surface that moves, divided by its mass, m2: nothing turns it
+SIZE = 100.0  # edge of the cubes of which a vessel of many facets is made, in units of its radius
 
 # it warns that half spaces don't meet deformable bodies
 logging.getLogger("drake").setLevel(logging.ERROR)
@@ -58,7 +55,6 @@ class Drake(Free):
         plant.SetUseSampledOutputPorts(False)
         moments = engine.UnitInertia(*(np.array(body.inertia) / body.mass))
         ball = plant.AddRigidBody("body", engine.SpatialInertia(body.mass, np.zeros(3), moments))
-        self.own = ball.index()
         for k, (place, shape) in enumerate(self.shapes()):
             self.add(ball, place, shape, f"body{k}")
         moving = [each for each in scene.surfaces if self.goes_along(each) or each.turning]
@@ -164,9 +160,7 @@ class Drake(Free):
         for k in range(results.num_point_pair_contacts()):
             info = results.point_pair_contact_info(k)
             pair = info.point_pair()
-            sign = 1 if info.bodyB_index() == self.own else -1  # it acts on the second body
-            surface = self.surfaces[pair.id_A if sign > 0 else pair.id_B]
-            shown.append(Touch(surface, sign * info.contact_force(), -pair.depth))
+            shown.append(self.touch(pair.id_A, pair.id_B, info.contact_force(), -pair.depth))
         return shown
 
 

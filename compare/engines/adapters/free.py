@@ -32,8 +32,7 @@ BodyState = tuple[Any, ...]
 class Library:
     """The package that an engine comes in, which may be missing, and the module of its adapters."""
 
-    name: str
-    """Of the package."""
+    name: str  # of the package
     module: str
 
     @property
@@ -77,12 +76,9 @@ def against(
 class Touch(NamedTuple):
     """A contact point of the engine, and what it carried in the last step."""
 
-    surface: int
-    """Which of the scene's surfaces."""
-    force: Array
-    """On the body, in world axes, shape (3,), N."""
-    gap: float
-    """m"""
+    surface: int  # which of the scene's surfaces
+    force: Array  # on the body, in world axes, shape (3,), N
+    gap: float  # m
 
 
 class BreakdownError(RuntimeError):
@@ -93,14 +89,12 @@ class Free(ABC):
     """A free body in an engine: in the best settings, or as it comes, with facets."""
 
     PRECISION = "f64"
-    FEATURES: tuple[str, ...] = ()
-    """Of `Scene.needs`, what it can do."""
+    FEATURES: tuple[str, ...] = ()  # of `Scene.needs`, what it can do
     AHEAD = 0.5
     """Share of a step by which positions, where contacts and forces are found, are ahead of
     velocities. Semi-implicit steps are leapfrog, of second order, once one says so: in the best
     settings bodies start so far on, and what is read of them is taken back."""
-    RESOLUTION = 1e-9
-    """The least slip speed that the engine tells from rolling, m/s."""
+    RESOLUTION = 1e-9  # the least slip speed that the engine tells from rolling, m/s
 
     TELLS = TURNS = False
     """Whether the engine tells what contacts carry, and whether its planes turn."""
@@ -115,6 +109,7 @@ class Free(ABC):
         self.world: Any
         self.timestep = self.now = self.ahead = 0.0
         self.seen: BodyState | None = None
+        self.surfaces: dict[Any, int] = {}  # of the scene, by what the engine calls them
 
     def build(self, scene: Scene, timestep: float) -> None:
         """Put the scene into the engine; raises `NotImplementedError` if it can't have it."""
@@ -187,6 +182,12 @@ class Free(ABC):
     def touches(self) -> list[Touch]:
         """The contact points of the last step, of an engine that `TELLS`."""
         raise NotImplementedError
+
+    def touch(self, first: Any, second: Any, on_second: Array, gap: float) -> Touch:
+        """A contact of the body with a surface, either of which is the first."""
+        if first in self.surfaces:
+            return Touch(self.surfaces[first], on_second, gap)
+        return Touch(self.surfaces[second], -on_second, gap)
 
     def close(self) -> None:  # noqa: B027
         """Release what the engine holds: most hold nothing."""

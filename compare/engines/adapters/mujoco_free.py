@@ -15,12 +15,10 @@ from compare.engines.adapters.scene import FACETS, Scene, Vector, facing
 from model.arrays import Array
 
 FEATURES = ("two bodies", "moving surface", "dry joint", "tripod", "disc", "anisotropic friction")
-_HEAVY = 1e6
-"""Mass of a wall that moves divided by that of the body, which it doesn't feel."""
+_HEAVY = 1e6  # mass of a wall that moves divided by that of the body, which it doesn't feel
 _SOLIMP = 0.999
 """Impedance of dry friction in joints: an engine's own bears a share 1 - d less than it should."""
-_PARTS = 16
-"""Steps in one in which something lands."""
+_PARTS = 16  # steps in one in which something lands
 _WALL = 2.0
 """Half edges of the piece of wall that goes with the body, in radii: what rolls on a wall of the
 size of the body is told from what stays where it is."""
@@ -52,7 +50,7 @@ class Bodies(Free):
         self.data = mujoco.MjData(self.model)
         named = {surface.name: k for k, surface in enumerate(self.scene.surfaces)}
         names = (self.model.geom(k).name.rstrip("0123456789") for k in range(self.model.ngeom))
-        self.surfaces = [named.get(name, -1) for name in names]
+        self.surfaces = {k: named[name] for k, name in enumerate(names) if name in named}
         mujoco.mj_resetDataKeyframe(self.model, self.data, 0)
         self.bodies = [self.data.body(name) for name in ("body", "under")[: len(self.scene.bodies)]]
 
@@ -73,12 +71,10 @@ class Bodies(Free):
 
     def touches(self) -> list[Touch]:
         shown, force, contact = [], np.empty(6), self.data.contact
-        for k, (one, other) in enumerate(contact.geom):
+        for k, (one, other) in enumerate(contact.geom.tolist()):
             mujoco.mj_contactForce(self.model, self.data, k, force)  # on the second geom
-            on_surface = self.surfaces[one] < 0 <= self.surfaces[other]
-            on_body = (-force[:3] if on_surface else force[:3]) @ contact.frame[k].reshape(3, 3)
-            surface = self.surfaces[other if on_surface else one]
-            shown.append(Touch(surface, on_body, float(contact.dist[k])))
+            on_second = force[:3] @ contact.frame[k].reshape(3, 3)
+            shown.append(self.touch(one, other, on_second, float(contact.dist[k])))
         return shown
 
 

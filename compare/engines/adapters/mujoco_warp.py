@@ -34,9 +34,8 @@ class Warp(mujoco_free.Bodies):
         model, data = self.model, self.data
         mujoco.mj_forward(model, data)
         self.number = model.body("body").id
-        with warp.ScopedDevice("cpu"), warnings.catch_warnings():
-            # that the friction of one geom is less than MuJoCo likes: a pair's counts
-            warnings.simplefilter("ignore")
+        # that the friction of one geom is less than MuJoCo likes: a pair's counts
+        with warp.ScopedDevice("cpu"), warnings.catch_warnings(action="ignore"):
             self.model = engine.put_model(model)
             self.data = engine.put_data(model, data, nconmax=32, njmax=128)
 

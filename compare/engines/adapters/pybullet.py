@@ -41,7 +41,7 @@ class PyBullet(Free):
             settings |= {"contactSlop": 0.0, "contactBreakingThreshold": 0.2}
         engine.setPhysicsEngineParameter(**settings, **here)
         engine.setGravity(0, 0, -scene.g * self.scale, **here)
-        self.surfaces: dict[int, int] = {}
+        self.surfaces = {}
         for surface, _, point, normal in self.planes():
             shape = engine.createCollisionShape(engine.GEOM_PLANE, planeNormal=[0, 0, 1], **here)
             # the last one is the one that moves

@@ -26,8 +26,7 @@ class Rapier(Free):
     PRECISION, TURNS = "f32", True
     FEATURES = ("two bodies", "moving surface", "restitution", "tripod", "disc")
     RESOLUTION = 1e-4
-    SMALL = 16
-    """Small steps in one, in the best settings: the engine's own, unless a wall moves."""
+    SMALL = 16  # small steps in one, in the best settings: the engine's own, unless a wall moves
 
     def build(self, scene: Scene, timestep: float) -> None:
         self.small = self.SMALL if self.best and scene.in_cylinder else 1

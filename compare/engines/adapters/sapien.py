@@ -15,13 +15,11 @@ from compare.engines.adapters.free import CORNERS, BodyState, Free
 from compare.engines.adapters.scene import Vector, upright
 from model.arrays import Array
 
-with warnings.catch_warnings():
-    warnings.simplefilter("ignore")  # that no Vulkan is found: nothing is drawn
+with warnings.catch_warnings(action="ignore"):  # that no Vulkan is found: nothing is drawn
     import sapien as engine
 physx = engine.physx
 
-WALL = 3.0
-"""Half edge of the box whose face is the wall that goes with the body, in radii."""
+WALL = 3.0  # half edge of the box whose face is the wall that goes with the body, in radii
 
 
 class Sapien(Free):

@@ -20,8 +20,7 @@ from model.kinematics import rotated, tangent
 Vector = tuple[float, float, float]
 TIME_STEPS = (4e-3, 2e-3, 1e-3)
 """Time steps at which an engine is asked, s; every sample of a case falls on a step of each."""
-FACETS = 64
-"""Planes that stand for a cylinder in MJCF, which has no hollow one."""
+FACETS = 64  # planes that stand for a cylinder in MJCF, which has no hollow one
 
 
 @dataclass(frozen=True)
@@ -29,19 +28,14 @@ class Surface:
     """A fixed surface: a plane, or the inner side of a vertical cylinder."""
 
     name: str
-    friction: float
-    """Coulomb's coefficient of the pair of it and the body."""
-    point: Vector = (0.0, 0.0, 0.0)
-    """A point of the plane, or of the cylinder's axis, m."""
-    normal: Vector = (0.0, 0.0, 1.0)
-    """Of the plane, towards the body."""
-    radius: float | None = None
-    """Of the cylinder, m; None for a plane."""
+    friction: float  # Coulomb's coefficient of the pair of it and the body
+    point: Vector = (0.0, 0.0, 0.0)  # a point of the plane, or of the cylinder's axis, m
+    normal: Vector = (0.0, 0.0, 1.0)  # of the plane, towards the body
+    radius: float | None = None  # of the cylinder, m; None for a plane
     turning: float = 0.0
     """Angular velocity of its material about the vertical through `point`, rad/s; a turntable has
     one."""
-    velocity: Vector = (0.0, 0.0, 0.0)
-    """Of its material along itself, m/s; a belt has one."""
+    velocity: Vector = (0.0, 0.0, 0.0)  # of its material along itself, m/s; a belt has one
     restitution: float = 0.0
     """Share of its normal speed with which the body leaves it after an impact."""
     across: float | None = None
@@ -54,21 +48,15 @@ class Surface:
 class Body:
     """A rigid body and its start; its centre of mass is the middle of its shape."""
 
-    position: Vector
-    """Of the centre at the start, m."""
-    velocity: Vector
-    """m/s"""
-    spin: Vector
-    """Angular velocity, rad/s."""
-    shape: str
-    """``sphere``, ``box``, ``disc``, round its z axis, or ``tripod``: three spheres."""
+    position: Vector  # of the centre at the start, m
+    velocity: Vector  # m/s
+    spin: Vector  # angular velocity, rad/s
+    shape: str  # ``sphere``, ``box``, ``disc``, round its z axis, or ``tripod``: three spheres
     size: tuple[float, ...]
     """Radius; or the three half edges; or radius and half the thickness; or of a tripod's feet the
     radius, how far from the axis, and how far below the centre they are, the first along x; m."""
-    mass: float
-    """kg"""
-    inertia: Vector
-    """Principal moments about the centre, kg m2."""
+    mass: float  # kg
+    inertia: Vector  # principal moments about the centre, kg m2
     orientation: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
     """Unit quaternion, the scalar first."""
 
@@ -100,26 +88,18 @@ class Scene:
     name: str
     body: Body
     surfaces: tuple[Surface, ...]
-    g: float = 9.81
-    """Gravity, along -z, m/s2."""
-    pull: Vector = (0.0, 0.0, 0.0)
-    """A constant force at the centre, N."""
-    growth: Vector = (0.0, 0.0, 0.0)
-    """A force at the centre that grows with time, N/s."""
-    drag: float = 0.0
-    """c of a fluid's drag -m c (v - u), 1/s."""
-    flow: float = 0.0
-    """Angular velocity of that fluid about the z axis: u = flow (-y, x, 0), rad/s."""
-    spring: float = 0.0
-    """Stiffness of a spring that draws the centre to the origin, N/m."""
+    g: float = 9.81  # gravity, along -z, m/s2
+    pull: Vector = (0.0, 0.0, 0.0)  # a constant force at the centre, N
+    growth: Vector = (0.0, 0.0, 0.0)  # a force at the centre that grows with time, N/s
+    drag: float = 0.0  # c of a fluid's drag -m c (v - u), 1/s
+    flow: float = 0.0  # angular velocity of that fluid about the z axis: u = flow (-y, x, 0), rad/s
+    spring: float = 0.0  # stiffness of a spring that draws the centre to the origin, N/m
     joint: Vector | None = None
     """The way that a joint leaves to the body, which doesn't turn then; None: it is free."""
-    dry: float = 0.0
-    """Dry friction in that joint, N."""
+    dry: float = 0.0  # dry friction in that joint, N
     under: Body | None = None
     """A second body, on which the first one stands. It alone touches the surfaces."""
-    between: float = 0.0
-    """Coulomb's coefficient of the two bodies."""
+    between: float = 0.0  # Coulomb's coefficient of the two bodies
 
     def force(self, t: float, position: Any, velocity: Any) -> Vector:
         """All that acts at the body's centre at a time but gravity and contacts, N."""

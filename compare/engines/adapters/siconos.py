@@ -29,8 +29,7 @@ from model import InputError
 from model.versions import ABSENT
 
 PROGRAM = Path(__file__).with_name("_siconos_worker.py")
-TIMEOUT = 60.0
-"""For how long, s, an answer is waited for."""
+TIMEOUT = 60.0  # for how long, s, an answer is waited for
 SETTINGS = {"theta": 0.5, "activation": 1e-9, "projection": 1e-12}
 SETTINGS |= {"newton": 1e-15, "tolerance": 1e-14}
 """theta of `MoreauJeanDirectProjectionOSI`, the share of forces that is taken at the end of a step;

@@ -25,23 +25,19 @@ from model.parameters import POSITIVE, check_number
 from model.trajectory import samples
 from model.versions import current_versions
 
-_HUGE = 1e8
-"""A coordinate, velocity or force beyond this, in SI units, has diverged."""
-_REACH = 1e-3
-"""Gap, in radii, up to which a contact is closed by what is seen of the motion alone."""
+_HUGE = 1e8  # a coordinate, velocity or force beyond this, in SI units, has diverged
+_REACH = 1e-3  # gap, in radii, up to which a contact is closed by what is seen of the motion alone
 _ROLLS = 3.0
 """Slip speed, in units of the least that an engine tells from rolling, up to which a contact rolls:
 how exact that is isn't known."""
-NOTED = 1024
-"""Steps of which the cases are told at once."""
+NOTED = 1024  # steps of which the cases are told at once
 
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
     """Settings of a run by another engine: the time step; its adapter declares all else."""
 
-    timestep: float = 1e-3
-    """s"""
+    timestep: float = 1e-3  # s
 
     def __post_init__(self) -> None:
         check_number("timestep", self.timestep, "s", POSITIVE)
