@@ -66,55 +66,48 @@ def newton(case, touching=None, friction=()):
     and the velocity of what it touches; `friction` the coefficients, None for what rolls. All
     forces are solved for together from what keeps contacts closed and, where they roll, without
     slip; least squares where that leaves some open."""
-    body, count, near = case.body, len(friction), 1e-6  # s, half the time of a difference
+    body, near = case.body, 1e-6  # s, half the time of a difference
 
     def rates(t, state):
         (w, *axis), velocity, spin = state[3:7], state[7:10], state[10:]
-        begin = np.concatenate(
-            [velocity, 0.5 * np.array([-spin @ axis, *(w * spin + np.cross(spin, axis))])]
-        )
+        turning = 0.5 * np.array([-spin @ axis, *(w * spin + np.cross(spin, axis))])
+        begin = np.concatenate([velocity, turning])
         axes = rotated(state[3:7], np.eye(3)).T
         inertia = axes @ np.diag(body.inertia) @ axes.T
         linear = np.array(case.force(t, state[:3], velocity)) / body.mass - case.g * UP
         # without contacts
         found = np.concatenate([linear, np.linalg.solve(inertia, -np.cross(spin, inertia @ spin))])
-        if count:
-            now, after, before = (
-                np.array(touching(state[:7] + d * begin)) for d in (0.0, near, -near)
-            )
-            crosses = [np.cross(arm, np.eye(3)).T for arm, _, _ in now]
-            pushed = [
-                np.vstack([np.eye(3) / body.mass, np.linalg.solve(inertia, cross)])
-                for cross in crosses
+        if not friction:
+            return np.concatenate([begin, found])
+        now, after, before = (np.array(touching(state[:7] + d * begin)) for d in (0.0, near, -near))
+        crosses = [np.cross(arm, np.eye(3)).T for arm, _, _ in now]
+        # rows of what all forces must come to
+        of_forces = np.vstack(
+            [
+                np.hstack([np.eye(3) / body.mass] * len(now)),
+                np.linalg.solve(inertia, np.hstack(crosses)),
             ]
-            # rows of what all forces must come to
-            of_forces, rows, right = np.hstack(pushed), [], []
-            for k, ((arm, normal, under), rate) in enumerate(
-                zip(now, (after - before) / (2 * near), strict=True)
-            ):
-                slip, of_slip = (
-                    velocity + np.cross(spin, arm) - under,
-                    np.hstack([np.eye(3), -crosses[k]]),
-                )
-                rest = rate[2] - np.cross(spin, rate[0]) - of_slip @ found
-                if friction[k] is None:
-                    rows.append(of_slip @ of_forces)
-                    right.append(rest)
-                    continue
-                rows.append(normal[None] @ of_slip @ of_forces)
-                right.append([normal @ rest - rate[1] @ slip])
-                along = slip - (slip @ normal) * normal
-                law = np.eye(3) - np.outer(
-                    normal - friction[k] * along / np.linalg.norm(along), normal
-                )
-                rows.append(np.kron(np.eye(count)[k], law))
-                right.append(np.zeros(3))
-            found = (
-                found
-                + of_forces
-                @ np.linalg.lstsq(np.vstack(rows), np.concatenate(right), rcond=1e-12)[0]
+        )
+        rows, right = [], []
+        for k, ((arm, normal, under), rate) in enumerate(
+            zip(now, (after - before) / (2 * near), strict=True)
+        ):
+            slip, of_slip = (
+                velocity + np.cross(spin, arm) - under,
+                np.hstack([np.eye(3), -crosses[k]]),
             )
-        return np.concatenate([begin, found])
+            rest = rate[2] - np.cross(spin, rate[0]) - of_slip @ found
+            if friction[k] is None:
+                rows.append(of_slip @ of_forces)
+                right.append(rest)
+                continue
+            along = slip - (slip @ normal) * normal
+            sliding = normal - friction[k] * along / np.linalg.norm(along)
+            law = np.eye(3) - np.outer(sliding, normal)
+            rows += [normal[None] @ of_slip @ of_forces, np.kron(np.eye(len(now))[k], law)]
+            right += [[normal @ rest - rate[1] @ slip], np.zeros(3)]
+        forces = np.linalg.lstsq(np.vstack(rows), np.concatenate(right), rcond=1e-12)[0]
+        return np.concatenate([begin, found + of_forces @ forces])
 
     return rates
 
@@ -122,8 +115,7 @@ def newton(case, touching=None, friction=()):
 def moved(case, rates, more=(), ends=lambda x: 1.0, change=None):
     """Place, velocity and spin of a body at the samples; `more` than they may belong to the state.
 
-    Wherever `ends` falls to zero the state becomes what `change` makes of it.
-    """
+    Wherever `ends` falls to zero the state becomes what `change` makes of it."""
     body = case.body
     start = [*body.position, *body.orientation, *body.velocity, *body.spin, *more]
     return np.delete(switched(rates, start, case.times, ends, change)[:, :13], range(3, 7), axis=1)
@@ -137,15 +129,8 @@ def switched(rates, start, times, ends, change):
             return ends(x) if t > begin + 1e-7 else 1.0
 
         falls.terminal, falls.direction = True, -1
-        found = solve_ivp(
-            rates,
-            (begin, times[-1]),
-            state,
-            events=falls,
-            dense_output=True,
-            max_step=0.02,
-            **SHARP,
-        )
+        how = SHARP | {"events": falls, "dense_output": True, "max_step": 0.02}
+        found = solve_ivp(rates, (begin, times[-1]), state, **how)
         out += [found.sol(t) for t in times[(times > begin) & (times <= found.t[-1])]]
         begin, state = found.t[-1], change and change(found.y[:, -1])
     return np.array(out)
@@ -158,12 +143,9 @@ def ball(case, letters):
 
     def touching(place):
         for surface, _ in own:
-            inward = -place[:3] * [1, 1, 0]
-            normal = (
-                np.array(surface.normal)
-                if surface.radius is None
-                else inward / np.linalg.norm(inward)
-            )
+            normal = np.array(surface.normal)
+            if surface.radius:
+                normal = -place[:3] * [1, 1, 0] / np.hypot(*place[:2])
             arm = -case.body.size[0] * (case.body.shape == "sphere") * normal
             yield arm, normal, surface.turning * np.cross(UP, place[:3] + arm)
 
@@ -224,9 +206,8 @@ def rocking(case):
         return rotated(state[3:7], np.array(body.size) * [side, 0, -1])
 
     def rates(t, state):
-        return np.append(
-            newton(case, floor(lambda place: [corner(place, state[13])]), [None])(t, state[:13]), 0
-        )
+        edge = floor(lambda place: [corner(place, state[13])])
+        return np.append(newton(case, edge, [None])(t, state[:13]), 0)
 
     def impact(state):
         arm, moment = corner(state, -state[13]), body.inertia[1]
@@ -240,9 +221,7 @@ def rocking(case):
 def bouncing(case):
     """A fall, from impact to impact."""
     back = np.where(np.arange(13) == 9, -case.surfaces[0].restitution, 1.0)
-    return moved(
-        case, newton(case), (), lambda x: x[2] - case.body.size[0], lambda state: back * state
-    )
+    return moved(case, newton(case), (), lambda x: x[2] - case.body.size[0], back.__mul__)
 
 
 def swinging(case):
@@ -277,13 +256,8 @@ def sliding(case):
     slips = np.eye(count) - np.eye(count, k=-1)  # of velocities: each body's past what is under it
     belt = np.eye(count)[0] * np.dot(surface.velocity, way)
     answer = h * slips / masses @ slips.T  # of slips to friction
-    v, s, f, out, done = (
-        np.array([body.velocity for body in bodies]) @ way,
-        np.zeros(count),
-        np.zeros(count),
-        [],
-        0,
-    )
+    v, out, done = np.array([body.velocity for body in bodies]) @ way, [], 0
+    s, f = np.zeros((2, count))
     for t in case.times:
         for _ in range(round(t / h) - done):
             free = v - h * case.g * way[2]
@@ -297,10 +271,8 @@ def sliding(case):
             new = free + h * slips.T @ f / masses
             s, v = s + h * (v + new) / 2, new
         done = round(t / h)
-        states = [
-            [body.position + x * way, w * way, 0 * way]
-            for body, x, w in zip(bodies, s, v, strict=True)
-        ]
+        places = [body.position for body in bodies] + np.outer(s, way)
+        states = np.stack([places, np.outer(v, way), np.outer(0 * v, way)], axis=1)
         out.append(np.ravel(states[::-1]))
     return np.array(out)
 
@@ -337,11 +309,8 @@ def changes(case):
         return np.empty(0), []
     p, x0 = case.motion
     events = analytic.simulate(p, x0, case.times[-1], rtol=1e-12).events
-    pairs = [
-        (Kinds(a).name, Kinds(b).name)
-        for a, b in zip(events.from_case, events.to_case, strict=True)
-    ]
-    return events.time, ["N" in before and before != after for before, after in pairs]
+    open_before = np.array(["N" in Kinds(each).name for each in events.from_case], bool)
+    return events.time, open_before & (events.from_case != events.to_case)
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name not in WAYS])
@@ -355,31 +324,25 @@ def test_a_ball_moves_so_from_every_sixth_sample_to_the_next(name):
         if changed or not np.any(case.exact[k - 1, 3:]):
             continue
         start = np.insert(case.exact[k - 1], 3, case.body.orientation)
-        found = solve_ivp(ball(case, letters), (begin, end), start, **SHARP | {"rtol": 1e-10}).y[
-            :, -1
-        ]
-        off = (
-            np.linalg.norm((np.delete(found, range(3, 7)) - case.exact[k]).reshape(3, 3), axis=1)
-            / case.scales
-        )
+        found = solve_ivp(ball(case, letters), (begin, end), start, **SHARP | {"rtol": 1e-10})
+        off = np.delete(found.y[:, -1], range(3, 7)) - case.exact[k]
+        off = np.linalg.norm(off.reshape(3, 3), axis=1) / case.scales
         assert off.max() < 1e-9, (end, letters)
         checked += 1
     assert checked >= 2 or not np.any(case.exact[-1, 3:])
 
 
-@pytest.mark.parametrize(
-    ("name", "share"),
-    [
-        ("block-rests", 0.9),
-        ("block-slides", 1.25),
-        ("pinched-block", 0.5),
-        ("groove-rests", 0.9),
-        ("held-at-30", 0.9),
-        ("held-at-45", 0.9),
-        ("gives-way-at-30", 1.25),
-        ("gives-way-at-45", 1.25),
-    ],
-)
+SHARES = {
+    "block-rests": 0.9,
+    "block-slides": 1.25,
+    "pinched-block": 0.5,
+    "groove-rests": 0.9,
+    **{f"held-at-{degrees}": 0.9 for degrees in (30, 45)},
+    **{f"gives-way-at-{degrees}": 1.25 for degrees in (30, 45)},
+}
+
+
+@pytest.mark.parametrize(("name", "share"), SHARES.items())
 def test_rest_needs_the_share_of_friction_that_is_said(name, share):
     """Statics: normal forces balance what acts across the surfaces, and friction what is left."""
     case = CASES[name]

@@ -70,9 +70,10 @@ def simulated(*given, **more):
     return carry_out(task_of(*given, **more))
 
 
-@pytest.mark.parametrize(
-    "name", [name for name, each in ENGINES.items() if "timestep" in each.options]
-)
+STEPPING = [name for name, each in ENGINES.items() if "timestep" in each.options]
+
+
+@pytest.mark.parametrize("name", STEPPING)
 def test_a_step_too_long_for_the_problem_is_refused_by_all(tmp_path, name):
     """By the same rule, before anything is written, and whether or not the engine is installed."""
     for orbit, least, of in ((0.0, "0.0208", "omega_0"), (100.0, "0.0025", "omega_c")):
@@ -97,10 +98,8 @@ def test_errors_of_a_stationary_state_fall_with_the_step(name):
         assert seen.complete
         assert seen.cases[-1] is state.case
         assert seen.theta[-1] == pytest.approx(10.0 * x[2], rel=0.02)  # the azimuth isn't wrapped
-        forces = np.concatenate(
-            [seen.force_A[-1] - truth.force_A, seen.force_B[-1] - truth.force_B]
-        )
-        errors.append([seen.omega_c[-1] / x[2] - 1, np.abs(forces).max() / (p.m * p.g)])
+        A, B = seen.force_A[-1] - truth.force_A, seen.force_B[-1] - truth.force_B
+        errors.append([seen.omega_c[-1] / x[2] - 1, np.abs([A, B]).max() / (p.m * p.g)])
     assert np.abs(errors[1]).max() < 2e-3
     assert np.abs(errors[1]) == pytest.approx(np.abs(errors[0]) / 2, rel=0.2, abs=2e-4)
 
@@ -161,17 +160,15 @@ def test_a_step_that_cannot_be_solved_is_the_run_s_failure(name, monkeypatch):
 
 
 LACKING = "siconos is not installed"
-
-
-@pytest.mark.parametrize(
-    ("name", "named", "says"),
-    [
-        ("pybullet", "", "pybullet is not installed: pip install pybullet"),
-        ("dart-defaults", "", "dartpy is not installed: pip install dartpy"),
-        ("siconos", "", f"{LACKING}: on Debian or Ubuntu, apt-get install python3-siconos"),
-        ("siconos", "absent", f"{LACKING} for absent, which DUALBALL_SICONOS_PYTHON names"),
-    ],
+ABSENT = (
+    ("pybullet", "", "pybullet is not installed: pip install pybullet"),
+    ("dart-defaults", "", "dartpy is not installed: pip install dartpy"),
+    ("siconos", "", f"{LACKING}: on Debian or Ubuntu, apt-get install python3-siconos"),
+    ("siconos", "absent", f"{LACKING} for absent, which DUALBALL_SICONOS_PYTHON names"),
 )
+
+
+@pytest.mark.parametrize(("name", "named", "says"), ABSENT)
 def test_what_is_not_installed_says_what_to_do(name, named, says, tmp_path, monkeypatch, capsys):
     asked = ["simulate", "sweep --vary eta=0.1,0.2", "attractors", "validate"]
     if ENGINES[name].missing:  # the league loads engines in processes of their own
@@ -274,42 +271,37 @@ def test_engines_on_warp(engine):
     assert run(CASES["sphere-slips-down"], f"{OWN}.{engine}", steps=(2e-3,), limit=600).passed
 
 
-@pytest.mark.parametrize(
-    "normal", [(0, 0, 1), (0, 0, -1), (-1, 0, 0), (0.6, 0, 0.8), (0, -0.6, -0.8)]
-)
+NORMALS = (0, 0, 1), (0, 0, -1), (-1, 0, 0), (0.6, 0, 0.8), (0, -0.6, -0.8)
+
+
+@pytest.mark.parametrize("normal", NORMALS)
 def test_turns(normal):
     assert rotated(np.array(upright(normal)), np.array([0, 0, 1])) == pytest.approx(normal)
 
 
 def test_a_python_without_its_libraries_is_the_person_s_error(monkeypatch):
     monkeypatch.setattr(siconos, "locate", lambda named: (sys.executable, "4.4.0"))
-    with pytest.raises(
-        InputError, match=r"siconos ended \(ModuleNotFoundError: No module named 'siconos"
-    ):
+    says = r"siconos ended \(ModuleNotFoundError: No module named 'siconos"
+    with pytest.raises(InputError, match=says):
         siconos.best.build(Vessel.of(P, State(), Flow.steady(1.0)), 1e-3)
 
 
-@pytest.mark.parametrize(
-    ("program", "says"),
-    [
-        ("import os; os.abort()", "ended (exit code -6)"),
-        ("raise ValueError('too much')", "ended (ValueError: too much)"),
-        ("""print('{"error": "RuntimeError: it"}')""", "could not go on (RuntimeError: it)"),
-        ("import time; time.sleep(60)", "gave no answer for 2 s"),
-        (
-            "while True: print(STATE, flush=True), input(), print([], flush=True), input()",
-            "diverged",
-        ),
-    ],
-)
+FAILS = {
+    "import os; os.abort()": "ended (exit code -6)",
+    "raise ValueError('too much')": "ended (ValueError: too much)",
+    """print('{"error": "RuntimeError: it"}')""": "could not go on (RuntimeError: it)",
+    "import time; time.sleep(60)": "gave no answer for 2 s",
+    "while True: print(STATE, flush=True), input(), print([], flush=True), input()": "diverged",
+}
+
+
+@pytest.mark.parametrize(("program", "says"), FAILS.items())
 def test_a_process_that_fails_is_the_run_s_failure(program, says, tmp_path, monkeypatch):
     """Whatever it does in the first step; it is gone after that."""
     script, started, popen = tmp_path / "program.py", [], siconos.subprocess.Popen
     state = "STATE = '[[0, NaN, 0], [0, 0, 0], [0, 0, 0]]'"
-    script.write_text(
-        f"{state}\nfor _ in range(2):\n    input()\n    print('null', "
-        f"flush=True)\ninput()\n{program}\n"
-    )
+    begin = "for _ in range(2):\n    input()\n    print('null', flush=True)\ninput()"
+    script.write_text(f"{state}\n{begin}\n{program}\n")
     monkeypatch.setattr(siconos, "PROGRAM", script)
     monkeypatch.setattr(siconos, "TIMEOUT", 2)  # a loaded machine takes half a second to begin
     monkeypatch.setattr(siconos, "locate", lambda named: (sys.executable, "4.4.0"))
@@ -353,6 +345,5 @@ def test_three_simulators_agree_on_random_sets():
         found = np.array(list(pool.map(ends, range(250))))
     (differ,) = np.nonzero(np.ptp(found[:, :3], axis=1) > AGREE)
     assert len(differ) <= 2, differ
-    assert (
-        np.abs(found[differ, 3] - found[differ, 0]) > AGREE
-    ).all()  # it is a question of rolling on
+    # it is a question of rolling on
+    assert (np.abs(found[differ, 3] - found[differ, 0]) > AGREE).all()

@@ -41,19 +41,17 @@ def test_errors_order_creep_and_cost():
     assert run(CASES["sphere-rolls-down"], defaults, [3e-3]).passed
 
 
-@pytest.mark.parametrize(
-    ("engine", "says"),
-    [
-        ("no.such", "no.such can't be used: ModuleNotFoundError: No module named 'no'"),
-        ("compare.bench.runner", "compare.bench.runner has no function build nor step nor state"),
-        (
-            SimpleNamespace(build=print, step=print),
-            "SimpleNamespace has no function state; an engine has build, step",
-        ),
-        ("compare.engines.adapters.mujoco_free:gone", " has no attribute 'gone' (mujoco "),
-        (Exact(PRECISION="f128"), "PRECISION = 'f128' must be one of f64, f32"),
-    ],
+HALF = SimpleNamespace(build=print, step=print)
+NO_ENGINES = (
+    ("no.such", "no.such can't be used: ModuleNotFoundError: No module named 'no'"),
+    ("compare.bench.runner", "compare.bench.runner has no function build nor step nor state"),
+    (HALF, "SimpleNamespace has no function state; an engine has build, step"),
+    ("compare.engines.adapters.mujoco_free:gone", " has no attribute 'gone' (mujoco "),
+    (Exact(PRECISION="f128"), "PRECISION = 'f128' must be one of f64, f32"),
 )
+
+
+@pytest.mark.parametrize(("engine", "says"), NO_ENGINES)
 def test_engines_that_are_none(engine, says):
     with pytest.raises(InputError) as refused:
         run(CASES["box-stops"], engine)
@@ -194,22 +192,19 @@ def test_an_engine_on_the_exact_cases_beside_tests_of_ones_own(pytester):
     assert outcomes["passed"] == 2 * len(bench.cases()) - new - 3  # and the tests that are named
 
 
-@pytest.mark.parametrize(
-    ("args", "message"),
-    [
-        (
-            "--dualball-engine nosuch",
-            "*nosuch can't be used: ModuleNotFoundError: No module named 'nosuch'*",
-        ),
-        ("--dualball-engine half", "*half has no function state*"),
-        ("--dualball-engine half --dualball-known half.py", "*no case is called 'build'*"),
-        ("--dualball-engine half --dualball-known none", "*cannot read none*"),
-    ],
-)
+REFUSED = {
+    "nosuch": "*nosuch can't be used: ModuleNotFoundError: No module named 'nosuch'*",
+    "half": "*half has no function state*",
+    "half --dualball-known half.py": "*no case is called 'build'*",
+    "half --dualball-known none": "*cannot read none*",
+}
+
+
+@pytest.mark.parametrize(("args", "message"), REFUSED.items())
 def test_what_cannot_be_tested(pytester, args, message):
     """Unless files are named nothing but the cases is collected."""
     pytester.makepyfile(half="build = step = print", test_mine="def test_mine(): assert True")
-    found = pytester.runpytest_inprocess(*INSTALLED, *args.split())
+    found = pytester.runpytest_inprocess(*INSTALLED, "--dualball-engine", *args.split())
     assert found.ret != 0
     (found.stderr if "known" in args else found.stdout).fnmatch_lines([message])
     assert found.parseoutcomes().get("passed", 0) == 0
