@@ -3,7 +3,6 @@ nothing when quiet."""
 
 from __future__ import annotations
 
-import math
 import sys
 import threading
 import time
@@ -46,9 +45,15 @@ def part(tell: Callable[[float], object], begin: float, end: float) -> Callable[
 class _Pace:
     """How fast something goes, by what was last said of it."""
 
-    def __init__(self) -> None:
-        self._first = self._began = self._said = time.monotonic()
-        self._at_first, self._before, self._done, self._total = 0, -1, 0, 0
+    def __init__(self, timed: bool = False) -> None:
+        """`timed` if what is said to be done is a share of time, that of compiling, too."""
+        self._timed, self._compiling, self._lost = timed, (0.0, -1), 0.0
+        self._first = self._said = time.monotonic()
+        self._at_first, self._done, self._total = -1, 0, 0
+
+    def _clock(self) -> float:
+        """Time in which something may have been done, s."""
+        return time.monotonic() - self._lost
 
     def note(self, done: int, total: int) -> bool:
         """Note how much is done; return whether that is the first to go by.
@@ -56,32 +61,34 @@ class _Pace:
         What an earlier session did, getting ready, or another part, of which there are more or
         fewer, is no measure of how fast this is."""
         self.look()
-        first = self._before < 0 or not total or total != self._total
+        first = self._at_first < 0 or not total or total != self._total
         if (done, total) != (self._done, self._total):
-            self._said, self._done, self._total = time.monotonic(), done, total
+            self._said, self._done, self._total = self._clock(), done, total
         if first:
-            self._first = self._began = time.monotonic()
-            self._at_first = self._before = done
+            self._first, self._at_first = self._clock(), done
+            if self._compiling[1] >= 0:
+                self._compiling = time.monotonic(), done
         return first
 
     def look(self) -> str:
-        """What is said of compiling, now and then: what is done meanwhile is a measure by half."""
-        if said := compiling.now():
-            self._began = self._said = time.monotonic()
-            self._before = self._done
+        """What is said of compiling, now and then: time in which nothing else was done is lost."""
+        said, (since, done) = compiling.now(), self._compiling
+        if said and done < 0:
+            self._compiling = time.monotonic(), self._done
+        elif done >= 0 and not said:
+            self._compiling = 0.0, -1
+            if done == self._done and not self._timed:
+                self._lost += time.monotonic() - since
         return said
 
     def left(self) -> float:
         """Seconds that are left; 0 where nobody knows.
 
-        While nothing is said, that is no sign that it is slow. Where numba has compiled others went
-        on: a part takes longer than since then, and less than in all."""
-        if not self._done > self._before >= 0:
+        While nothing is said, that is no sign that it is slow."""
+        if not self._done > self._at_first >= 0:
             return 0.0
-        of_late = (self._said - self._began) / (self._done - self._before)
-        in_all = (self._said - self._first) / (self._done - self._at_first)
-        a_part = math.sqrt(of_late * in_all)
-        left = a_part * (self._total - self._done) - (time.monotonic() - self._said)
+        a_part = (self._said - self._first) / (self._done - self._at_first)
+        left = a_part * (self._total - self._done) - (self._clock() - self._said)
         return max(left, 0.0)
 
     def __str__(self) -> str:
@@ -90,7 +97,7 @@ class _Pace:
 
 
 @contextmanager
-def reporter(quiet: bool = False, counted: bool = False) -> Iterator[Show]:
+def reporter(quiet: bool = False, counted: bool = False, timed: bool = False) -> Iterator[Show]:
     """Yield a function that shows progress on standard error, which is never silent for longer than
     `INTERVAL`, and at first than `SOON`; nor of compiling.
 
@@ -107,7 +114,7 @@ def reporter(quiet: bool = False, counted: bool = False) -> Iterator[Show]:
         left = TextColumn("{task.fields[pace]}")  # a new text whenever it is looked at
         columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn()
         with Progress(*columns, TimeElapsedColumn(), left, console=Console(stderr=True)) as bar:
-            pace = _Pace()
+            pace = _Pace(timed)
             line = bar.add_task(READY, total=None, pace=pace)
 
             def show(what: str, done: int, total: int, failed: int) -> None:
@@ -118,7 +125,7 @@ def reporter(quiet: bool = False, counted: bool = False) -> Iterator[Show]:
             yield show
     else:  # what is being done at once, and how far it is every `INTERVAL`, whatever happens
         began, ended = time.monotonic(), threading.Event()
-        pace, last = _Pace(), (READY, 0, 0, 0)
+        pace, last = _Pace(timed), (READY, 0, 0, 0)
 
         def remember(what: str, done: int, total: int, failed: int) -> None:
             nonlocal last

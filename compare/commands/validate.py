@@ -44,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
             console.print(title)
         console.print(line(verdict), soft_wrap=True)
 
-    with progress.reporter(args.quiet) as show:
+    with progress.reporter(args.quiet, timed=True) as show:
         verdicts = validation.validate(
             args.output,
             level=Level[args.level.upper()],

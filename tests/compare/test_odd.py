@@ -28,7 +28,7 @@ import pytest
 from compare.bench import settled
 from compare.commands import cli, options
 from model import InputError
-from tests.commands import COMMANDS, NEEDED, ROOT, parser_of, refused, started
+from tests.commands import COMMANDS, METER, NEEDED, ROOT, parser_of, refused, started
 
 ODD = ["", *"x nan -inf 0 -1 1e300 1e-300 1,5 ½ 1_000 0x10 99999999999999999999".split()]
 USUAL = "1 2 0.01 0.3".split()
@@ -371,6 +371,14 @@ USERS = {  # a slice of some 330 lines that were drawn by hand: what must be in 
     "league --engine ./mine.py -o new": "./mine.py can't be used: write it as Python imports it",
     "league --engine os.path -o new": "posixpath has no function build nor step nor state",
     "cases nothing": "sphere-slides-rolls",
+    "predict --parameters date.toml": "date.toml: unknown parameter 'day'",
+    "predict --parameters twice.toml": "twice.toml is not valid TOML: Cannot overwrite a value",
+    "simulate --flow clock.csv": "clock.csv, line 2: time = '12:00:00' must be a number in s",
+    "simulate --flow hertz.csv": "'omega_0 (Hz)': omega_0 must be in rad/s, not in Hz",
+    "simulate --flow twins.csv": "twins.csv, line 1: omega_0 is given twice",
+    "simulate --start omega_c=5rad/s": "omega_c = '5rad/s' must be a number in rad s-1",
+    "design three.toml": "ball: r = [1, 2, 3] must be a number in m, or the two between which",
+    "forecast no-mjcf.xml": "no-mjcf.xml: MuJoCo refuses it: XML Error: Unrecognized XML",
     "forecast /dev/null": "cannot read /dev/null: it is not a file",
     "inspect pipe": "cannot read pipe: it is not a file",
     "cases -o pipe": "cannot write to pipe: File exists",
@@ -394,6 +402,13 @@ TABLES = {
     "complex.csv": b"t,omega_0\n0,1+2j\n1,2\n",
     "gap.csv": b"t,omega_0\n0,1\n1,2\n",
     "self.xml": b'<mujoco><include file="self.xml"/></mujoco>',
+    "date.toml": b"day = 1979-05-27\n",
+    "twice.toml": b"mu = 1\nmu = 1\n",
+    "clock.csv": b"t,omega_0\n12:00:00,1\n12:00:01,2\n",
+    "hertz.csv": b"t,omega_0 (Hz)\n0,1\n1,2\n",
+    "twins.csv": b"t,omega_0,omega_0\n0,1,2\n",
+    "three.toml": METER.replace("[2e-3, 8e-3]", "[1, 2, 3]").encode(),
+    "no-mjcf.xml": b"<html/>",
     "deep.toml": b"a" + b".a" * 5000 + b" = 1\n",
 }
 

@@ -75,6 +75,22 @@ def test_another_part_has_a_pace_of_its_own(clock):
     assert pace.left() == pytest.approx(16 * 5.0 - 5.0)
 
 
+@pytest.mark.parametrize("meanwhile", [0, 10])
+def test_compiling_counts_where_others_went_on(monkeypatch, meanwhile):
+    """For 40 s, after 10 s of work; 10 s more at a part a second."""
+    now = 0.0
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now)
+    monkeypatch.setattr(progress.compiling, "now", lambda: "compiling" * (11 <= now < 51))
+    pace, told = progress._Pace(), {0: 0, 10: 9, 49: 9 + meanwhile, 60: 20 + meanwhile}
+    for second in range(61):
+        now = float(second)
+        pace.look()
+        if second in told:
+            pace.note(told[second], 60)
+    a_part = 60 / 30 if meanwhile else 20 / 20
+    assert pace.left() == pytest.approx(a_part * (60 - told[60]))
+
+
 def test_what_is_shown_is_what_is_being_measured_on_a_short_line():
     said = []
     far = progress.ValidationProgress(lambda what, *_: said.append(what), 30)
