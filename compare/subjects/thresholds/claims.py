@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -16,30 +16,21 @@ from analytic.stationary import slipping_branch
 from compare.method.record import Measurement, Relation
 from compare.verification.claim import Criterion, When, claim, criteria, given
 from compare.verification.judge import theory
-from compare.verification.states import thresholds_of, value_in
+from compare.verification.states import SMOOTH_END, changes_case, thresholds_of, value_in
 from model import Case, Parameters
 from model.arrays import Real
 
 _BY = "analytic.thresholds"
-SLIPPING = "floor force of settled slipping → 0"
-"""How omega_02 is measured where slipping ends without a fold: a claim of its own."""
+_measured = partial(Criterion, "thresholds")
 
 
-def _changes(m: Measurement) -> bool:
-    """Whether a threshold is measured where a ball changes its case."""
-    return m.at["by"] != SLIPPING
-
-
-def _threshold(quantity: str, when: When = _changes, protocol: str = "thresholds") -> Criterion:
+def _threshold(quantity: str, when: When = changes_case, protocol: str = "thresholds") -> Criterion:
     """A criterion on a threshold, which `analytic.thresholds` predicts."""
 
     def predict(m: Measurement) -> float:
         return float(getattr(thresholds_of(m), quantity))
 
     return Criterion(protocol, quantity, predict, when=when, by=f"{_BY}: {quantity}")
-
-
-_measured = partial(Criterion, "thresholds")  # a criterion on what this protocol measures
 
 
 def _unstable_quantity(m: Measurement) -> float:
@@ -73,16 +64,14 @@ def _end_of_rolling(name: str, p: Parameters) -> float:
     return float(brentq(_HOLDS[name], 0.01 * unit, 100 * unit, args=(p,), rtol=1e-12))
 
 
-def _holds(name: str) -> Iterator[Criterion]:
-    """Criteria on where rolling ends, by one of `_HOLDS`."""
+def _holds(name: str, quantity: str) -> Criterion:
+    """A criterion on where rolling ends, by one of `_HOLDS`."""
 
     def predict(m: Measurement) -> float:
         return theory(_end_of_rolling, name, m.parameters.replace(omega_0=1.0))
 
-    for quantity in ("omega_01", "omega_03"):
-        yield _measured(
-            quantity, predict, when=lambda m: m.parameters.mu < 1, by=f"rolling_forces.{name}"
-        )
+    by = f"rolling_forces.{name}"
+    return _measured(quantity, predict, when=lambda m: m.parameters.mu < 1, by=by)
 
 
 def _where_lasts(case: Case, p: Parameters, slow: float, fast: float) -> float:
@@ -95,21 +84,17 @@ def _where_lasts(case: Case, p: Parameters, slow: float, fast: float) -> float:
     return float(roots.sign_change(lasts, slow, fast))
 
 
-def _flow_of_slipping(t: analytic.Thresholds, fastest: float) -> float:
-    """A flow between the ends of SS, rad s-1; on a smooth wall it has no end but the fastest."""
-    ends = t.omega_04, t.omega_02, fastest
-    return math.sqrt(t.omega_01 * next(end for end in ends if not math.isnan(end)))
-
-
-def _lasting(case: Case, quantity: str, when: When = _changes) -> Criterion:
+def _lasting(case: Case, quantity: str, when: When = changes_case) -> Criterion:
     """A criterion on a threshold, where a case begins or ends by its stationary solution."""
 
     def predict(m: Measurement) -> float:
         p = m.parameters.replace(omega_0=1.0)
         unit = math.sqrt(p.g / p.R)
         slow, fast = 0.01 * unit, 100 * unit
-        if case is Case.SS:  # it has two ends
-            middle = _flow_of_slipping(thresholds_of(m), fast)
+        if case is Case.SS:  # it has two ends; on a smooth wall only the fastest flow is one
+            t = thresholds_of(m)
+            last = next(end for end in (t.omega_04, t.omega_02, fast) if not math.isnan(end))
+            middle = math.sqrt(t.omega_01 * last)
             slow, fast = (slow, middle) if quantity == "omega_01" else (middle, fast)
         return theory(_where_lasts, case, p, slow, fast)
 
@@ -131,7 +116,7 @@ CLAIMS = (
         "(12), (13), (22)",
         "Rolling at both points goes on just as long as forces within both friction cones admit "
         "it, for μ < 1.",
-        *(criterion for name in _HOLDS for criterion in _holds(name)),
+        *(_holds(name, quantity) for name in _HOLDS for quantity in ("omega_01", "omega_03")),
     ),
     claim(
         "table-5-P2",
@@ -164,7 +149,7 @@ CLAIMS = (
         _threshold("omega_04"),
         _lasting(Case.SS, "omega_04"),
         _measured(
-            "folds", lambda m: math.isfinite(thresholds_of(m).omega_04), by=f"{_BY}: omega_04"
+            "folds", lambda m: not math.isnan(thresholds_of(m).omega_04), by=f"{_BY}: omega_04"
         ),
     ),
     claim(
@@ -192,8 +177,8 @@ CLAIMS = (
             lambda m: bifurcation.critical_drag(m.parameters),
             by="diagram.critical_drag",
         ),
-        _threshold("omega_02", given(by=SLIPPING)),
-        _lasting(Case.SS, "omega_02", given(by=SLIPPING)),
+        _threshold("omega_02", given(by=SMOOTH_END)),
+        _lasting(Case.SS, "omega_02", given(by=SMOOTH_END)),
     ),
     claim(
         "one-fold",
