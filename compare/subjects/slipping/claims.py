@@ -19,11 +19,8 @@ from model import Case
 from model.arrays import Array
 from model.kinematics import SLIP_XYZ, VARIABLES
 
-_NR_NS = (Case.NR, Case.NS)
-_RR_RS = (Case.RR, Case.RS)
-_RR_SR = (Case.RR, Case.SR)
-_RR_SS = (Case.RR, Case.SS)
-_ON_THE_WALL = given(start="on the wall")
+_NR_NS, _RR_RS = (Case.NR, Case.NS), (Case.RR, Case.RS)
+_RR_SR, _RR_SS = (Case.RR, Case.SR), (Case.RR, Case.SS)
 _STABILITY = "slip_stability.stability"
 
 
@@ -63,18 +60,16 @@ def _following_case(m: Measurement) -> float:
 
 def _gamma_nr(m: Measurement) -> float:
     """gamma (56) in the measured direction of slip, rad s-2."""
-    return float(
-        slip_bounds.gamma_nr(math.atan2(m.at["n_y"], m.at["n_z"]), _state(m), m.parameters)
-    )
+    beta = math.atan2(m.at["n_y"], m.at["n_z"])
+    return float(slip_bounds.gamma_nr(beta, _state(m), m.parameters))
 
 
 def _by_forces(m: Measurement) -> float:
     """gamma from the forces of NR: friction that rolling needs along the slip, less eta B_x."""
     p = m.parameters
     _, (B_x, B_y, B_z) = analytic.contact_forces(Case.NR, _state(m), p)
-    return float(
-        (1 + p.j) / (p.j * p.m * p.r) * (B_y * m.at["n_z"] - B_z * m.at["n_y"] - p.eta * B_x)
-    )
+    needed = B_y * m.at["n_z"] - B_z * m.at["n_y"] - p.eta * B_x
+    return float((1 + p.j) / (p.j * p.m * p.r) * needed)
 
 
 def _neutral(m: Measurement) -> float:
@@ -95,10 +90,15 @@ def _greatest_as_printed(m: Measurement) -> float:
     return float(slip_stability.gamma(*_RR_SS, _state(m), n, m.parameters).max())
 
 
+def _held(m: Measurement) -> tuple[float, int]:
+    """The held omega_c, rad s-1, and to which side a ball slips at one contact."""
+    return m.at["omega_c"], round(m.at["n_x"] + m.at["n_y"])
+
+
 def _bounds(
     arrow: tuple[Case, Case],
-    by: str,
     bound: Callable[[Measurement], SlipBound | HeldBound],
+    by: str = "stationary",
     side: int = 0,
     from_rest: bool = False,
 ) -> tuple[Criterion, Criterion]:
@@ -209,18 +209,14 @@ CLAIMS = (
         "eq-61",
         "(60), (61)",
         "Rolling on the wall alone is stable with respect to slipping above ω₀₂.",
-        *_bounds(_NR_NS, "stationary", lambda m: slip_bounds.nr_to_ns(m.parameters)),
+        *_bounds(_NR_NS, lambda m: slip_bounds.nr_to_ns(m.parameters)),
     ),
     claim(
         "eq-66",
         "(66)",
         "A ball that rolls round slower than the fluid begins to slip at the wall once the "
         "difference exceeds (66).",
-        *_bounds(
-            _RR_RS,
-            "held",
-            lambda m: slip_bounds.rr_to_rs(m.parameters, m.at["omega_c"], round(m.at["n_y"])),
-        ),
+        *_bounds(_RR_RS, lambda m: slip_bounds.rr_to_rs(m.parameters, *_held(m)), "held"),
         text=Text.CORRECTED,
         reason="(66) prints μ; it is the friction of the wall, η, that holds the wall's contact.",
     ),
@@ -229,30 +225,21 @@ CLAIMS = (
         "(67)",
         "Going round with the fluid, the ball never begins to slip at the wall alone, but at ω₀ = "
         "0.",
-        *_bounds(
-            _RR_RS,
-            "stationary",
-            lambda m: slip_bounds.rr_to_rs_stationary(m.parameters),
-            from_rest=True,
-        ),
+        *_bounds(_RR_RS, lambda m: slip_bounds.rr_to_rs_stationary(m.parameters), from_rest=True),
     ),
     claim(
         "eq-73",
         "(73)",
         "A ball that rolls round slower than the fluid begins to slip at the floor once the "
         "difference exceeds (73).",
-        *_bounds(
-            _RR_SR,
-            "held",
-            lambda m: slip_bounds.rr_to_sr(m.parameters, m.at["omega_c"], round(m.at["n_x"])),
-        ),
+        *_bounds(_RR_SR, lambda m: slip_bounds.rr_to_sr(m.parameters, *_held(m)), "held"),
     ),
     claim(
         "eq-74",
         "(74)",
         "Going round with the fluid, the ball doesn't slip at the floor alone below ω₀₃; beyond, "
         "it lifts (η > j).",
-        *_bounds(_RR_SR, "stationary", lambda m: slip_bounds.rr_to_sr_stationary(m.parameters)),
+        *_bounds(_RR_SR, lambda m: slip_bounds.rr_to_sr_stationary(m.parameters)),
         _neutral_flow("omega_03", Case.RR, "loss of the floor"),
     ),
     claim(
@@ -260,27 +247,21 @@ CLAIMS = (
         "(82)",
         "Slip at both points at once, in the directions α = β = 0, grows above ω₀₁ and dies out "
         "below.",
-        *_bounds(_RR_SS, "stationary", lambda m: slip_bounds.rr_to_ss(m.parameters, 1), side=1),
+        *_bounds(_RR_SS, lambda m: slip_bounds.rr_to_ss(m.parameters, 1), side=1),
     ),
     claim(
         "eq-83",
         "(83)",
         "Slip at both points in the directions α = β = π dies out: (83) has no bound for η < 1.",
-        *_bounds(
-            _RR_SS,
-            "stationary",
-            lambda m: slip_bounds.rr_to_ss(m.parameters, -1),
-            side=-1,
-            from_rest=True,
-        ),
+        *_bounds(_RR_SS, lambda m: slip_bounds.rr_to_ss(m.parameters, -1), side=-1, from_rest=True),
     ),
     claim(
         "fig-4-5",
         "Figs. 4 and 5",
         "Above ω₀₂ a slight slip at the wall dies out and the ball rolls on; below, the ball keeps "
         "slipping.",
-        *_bounds(_NR_NS, "stationary", lambda m: slip_bounds.nr_to_ns(m.parameters)),
-        Criterion("settled", "case", _case_on_wall, when=_ON_THE_WALL, by=_STABILITY),
+        *_bounds(_NR_NS, lambda m: slip_bounds.nr_to_ns(m.parameters)),
+        Criterion("settled", "case", _case_on_wall, when=given(start="on the wall"), by=_STABILITY),
     ),
     claim(
         "eq-69",
