@@ -21,6 +21,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import islice, zip_longest
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import Delaunay
@@ -192,14 +193,50 @@ def _follow(runner: Runner, name: str, p: Parameters, edges: list[Edge]) -> Proc
         return
     # on floor and wall: a lifted ball moves alike at every height
     a, b = (constrained(Case.SS, state.mean, p) for state in both)
-    edge = Edge(runner, name, p, a, b, a, b - a)
+    line, edge, missed, moves = Line(a, b - a), None, 0, list[Array]()
     for _ in range(runner.sampling.edge_lines):
-        line = edge.with_next_line()
-        (bracket,) = yield from narrowed(line.search(), careful=False)
-        edge = edge.crossed(line, bracket)
-    yield from edge.rows()
-    if edge.moves:
+        search = _search(runner, p, line, (a, b), 5e-3 * 4.0**missed if edge else 0.0)
+        (bracket,) = yield from narrowed(search, careful=False)
+        if None in bracket.runs:
+            moves, missed = [], missed + 1
+        else:
+            before, edge = edge, Edge(runner, name, p, b, line, bracket)
+            moves = [*moves, np.abs(edge.crossing - before.crossing)] if before else []
+            line, missed = edge.next_line(), 0
+    if edge and moves:  # it was crossed by the last line, and by one before
+        edge = replace(edge, moves=tuple(moves))
+        yield from edge.rows()
         edges.append(edge)
+    else:
+        at = f"at omega_0 = {p.omega_0:.4g} rad/s"
+        yield runner.missing(name, f"{at} the last lines missed the border", 5)
+
+
+class Line(NamedTuple):
+    """A straight line of states (8,) between the attractors, or across the border."""
+
+    centre: Array
+    along: Array
+    """Its length is the distance of the attractors."""
+
+
+def _search(
+    runner: Runner, p: Parameters, line: Line, rests: tuple[Array, Array], reach: float
+) -> Search:
+    """A search for the place of the border on a line: from one attractor to the other, or within
+    `reach` of the centre.
+
+    Later lines are a hundredth as long, and four times as long after each that missed the
+    border."""
+    t_end, step = rounded_duration(p, runner.sampling.edge_time), coarse_step(p)
+    around, width = (Bracket(-reach, reach), 2.5e-6) if reach else (Bracket(0.0, 1.0), 1e-5)
+
+    def task(s: float, bracket: Bracket, attempt: Attempt) -> Task:
+        lasts, x0 = t_end * attempt.time, line.centre + s * line.along
+        return runner.task(p, x0, lasts, step, samples=round(lasts / (8 * step)))
+
+    slipping, lifted = (float(State.of(x).omega_c) for x in rests)
+    return Search(around, task, partial(ends_slipping, slipping=slipping, lifted=lifted), width)
 
 
 def _where_it_begins(near: Sequence[Edge]) -> Measurement | Missing:
@@ -207,7 +244,7 @@ def _where_it_begins(near: Sequence[Edge]) -> Measurement | Missing:
     noise = max(float(edge.uncertainty[2]) for edge in near)
     apart = [edge.estimate((edge.crossing - edge.lifted)[2], noise) for edge in near]
     place = extrapolated_zero(np.array([edge.p.omega_0 for edge in near]), apart)
-    tasks = [task for edge in near if edge.bracket for task in edge.bracket.tasks]
+    tasks = [task for edge in near for task in edge.bracket.tasks]
     at = Conditions(side="from above", by="unstable slipping meets the lifted ball")
     first, p = near[0], near[0].p.replace(omega_0=place.value)
     row = first.runner.measurement(first.set, p, "omega_02", place, tasks, **at)
@@ -216,42 +253,27 @@ def _where_it_begins(near: Sequence[Edge]) -> Measurement | Missing:
 
 @dataclass(frozen=True, eq=False)
 class Edge:
-    """The border between two basins at one flow, and where it crosses a line."""
+    """The border between two basins at one flow, where it crosses a line."""
 
     runner: Runner
     set: str
     p: Parameters
-    slipping: Array
-    lifted: Array  # the settled states on either side
-    centre: Array
-    line: Array  # direction of the line; its length is the distance of the attractors
-    missed: int = 0  # how many lines since the last crossing were too short
-    bracket: Bracket | None = None
+    lifted: Array  # the settled state on that side
+    line: Line
+    bracket: Bracket
     # by how much each of the last crossings differs from that of the line before
     moves: tuple[Array, ...] = ()
 
     @property
     def crossing(self) -> Array:
-        """The state in the middle of the last bracket."""
-        assert self.bracket is not None
-        return np.asarray(self.centre + self.bracket.place.value * self.line)
+        """The state in the middle of the bracket."""
+        return np.asarray(self.line.centre + self.bracket.place.value * self.line.along)
 
-    def crossed(self, line: Edge, bracket: Bracket) -> Edge:
-        """The edge after one more line: with the bracket found there, or missed."""
-        if None in bracket.runs:
-            return replace(self, moves=(), missed=self.missed + 1)
-        crossed = replace(line, bracket=bracket, missed=0)
-        if not self.bracket:
-            return replace(crossed, moves=())
-        return replace(crossed, moves=(*self.moves, np.abs(crossed.crossing - self.crossing)))
-
-    def with_next_line(self) -> Edge:
-        """The edge with the next line: from where the last two runs agreed, as they part.
+    def next_line(self) -> Line:
+        """The next line: from where the last two runs agreed, as they part.
 
         Together they are within 2e-3 of the distance of the attractors."""
-        if self.bracket is None:
-            return self
-        both, before = [run.x for run in self.bracket.runs if run is not None], self.line
+        both, before = [run.x for run in self.bracket.runs if run is not None], self.line.along
         low, high = (x[: min(map(len, both))] for x in both)
         along = np.abs((high - low) @ before / float(before @ before))
         together = int(np.argmax(along > 2e-3)) or len(along)
@@ -260,31 +282,12 @@ class Edge:
         mean = weights @ (low + high)[together - length : together] / (2 * weights.sum())
         parting = constrained(Case.SS, (high - low)[together - 1], self.p)
         line = parting * float(before @ before) / float(parting @ before)
-        return replace(self, centre=constrained(Case.SS, mean, self.p), line=line)
-
-    def search(self) -> Search:
-        """A search for the place of the border on the line.
-
-        Later lines are a hundredth as long, and four times as long after each that missed the
-        border."""
-        p, runner = self.p, self.runner
-        t_end, step = rounded_duration(p, runner.sampling.edge_time), coarse_step(p)
-        around, width = Bracket(0.0, 1.0), 1e-5
-        if self.bracket:
-            reach = 5e-3 * 4.0**self.missed
-            around, width = Bracket(-reach, reach), 2.5e-6
-
-        def task(s: float, bracket: Bracket, attempt: Attempt) -> Task:
-            lasts, x0 = t_end * attempt.time, self.centre + s * self.line
-            return runner.task(p, x0, lasts, step, samples=round(lasts / (8 * step)))
-
-        return Search(around, task, partial(ends_slipping, edge=self), width)
+        return Line(constrained(Case.SS, mean, self.p), line)
 
     @property
     def by_bracket(self) -> Array:
-        """Standard uncertainty of the crossing (8,) by the last bracket."""
-        assert self.bracket is not None
-        return np.asarray(self.bracket.place.uncertainty * self.line)
+        """Standard uncertainty of the crossing (8,) by the bracket."""
+        return np.asarray(self.bracket.place.uncertainty * self.line.along)
 
     @property
     def further(self) -> Array:
@@ -297,20 +300,20 @@ class Edge:
         *_, before, last = (0.0, *(float(np.linalg.norm(move[SLIP_XYZ])) for move in self.moves))
         sure = float(np.linalg.norm(self.by_bracket[SLIP_XYZ]))
         ratio = min(max(last - WIDTHS * sure, 0.0) / before, 0.9) if before else 0.0
-        onward, roll = self.with_next_line(), self.p.R / self.p.r
-        alike = np.array([1.0, 1.0, roll, 1.0, 1.0, 1.0, 1.0, 1.0])
-        off, along = (onward.centre - self.crossing) * alike, onward.line * alike
+        centre, onward = self.next_line()
+        alike = np.ones(8)
+        alike[2] = self.p.R / self.p.r
+        off, along = (centre - self.crossing) * alike, onward * alike
         ahead = np.abs(off - (off @ along) / (along @ along) * along) / alike
         return np.asarray(np.maximum(self.moves[-1] / (1 - ratio), ahead))
 
     @property
     def uncertainty(self) -> Array:
-        """Standard uncertainty of the crossing (8,), by the last bracket and further lines."""
+        """Standard uncertainty of the crossing (8,), by the bracket and further lines."""
         return np.asarray(np.hypot(self.by_bracket, self.further))
 
     def estimate(self, value: float, uncertainty: float) -> Estimate:
         """A number of the state at the crossing, by the causes of its uncertainty."""
-        assert self.bracket is not None
         causes = self.bracket.place, estimate(0.0, further_lines=1.0)
         moves = self.by_bracket, self.further
         sizes = [float(np.linalg.norm(move[SLIP_XYZ])) for move in moves]
@@ -318,36 +321,29 @@ class Edge:
 
     def rows(self) -> Measured:
         """Measurements of the state: omega_c, slips and the spin on the wall."""
-        p, runner = self.p, self.runner
-        # it is to be crossed by the last line, and by one before
-        if not (self.moves and self.bracket):
-            at = f"at omega_0 = {p.omega_0:.4g} rad/s"
-            why = f"{at} the last lines missed the border between the two attractors"
-            yield runner.missing(self.set, why, 5)
-            return
-        x, sure, roll = State.of(self.crossing), State.of(self.uncertainty), p.R / p.r
+        x, sure, roll = State.of(self.crossing), State.of(self.uncertainty), self.p.R / self.p.r
         values = {name: getattr(x, name) for name in ("omega_c", "slip_x", "slip_y", "slip_z")}
         values["wall_spin"] = x.slip_x + roll * x.omega_c
         slips = max(sure.slip_x, sure.slip_y, sure.slip_z, roll * sure.omega_c)
+        row = partial(self.runner.measurement, self.set, self.p, tasks=self.bracket.tasks)
         for name, value in values.items():
             of = self.estimate(value, slips / roll if name == "omega_c" else slips)
-            yield runner.measurement(self.set, p, f"edge_{name}", of, self.bracket.tasks, case="SS")
+            yield row(quantity=f"edge_{name}", value=of, case="SS")
 
 
-def ends_slipping(run: Trajectory, edge: Edge) -> bool | None:
-    """Whether a run tends to slipping: by its direction, or the rest state ahead.
+def ends_slipping(run: Trajectory, slipping: float, lifted: float) -> bool | None:
+    """Whether a run tends to slipping, by its direction, or the rest state ahead; of the two
+    attractors omega_c is given.
 
     None while it moves by little, ever more slowly, and to neither attractor: then it isn't the
     border's instability that moves it."""
-    slipping, lifted = (float(State.of(x).omega_c) for x in (edge.slipping, edge.lifted))
     parts = np.array_split(run.omega_c[tail(run, 0.4)], 4)
     first, second, third, last = (
         float(taper(len(part)) @ part / taper(len(part)).sum()) for part in parts
     )
     before, now, way = second - first, last - third, abs(lifted - slipping)
-    if abs(last - first) > FAR_FROM_EDGE * way or (
-        before * now > 0 and abs(now) > max(abs(before), 1e-5 * way)
-    ):
+    grows = before * now > 0 and abs(now) > max(abs(before), 1e-5 * way)
+    if abs(last - first) > FAR_FROM_EDGE * way or grows:
         return (last - first) * (slipping - lifted) > 0
     # by a geometric series
     end = last + now * abs(now) / max(abs(before) - abs(now), abs(now), 1e-300)
