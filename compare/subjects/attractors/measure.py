@@ -1,17 +1,4 @@
-"""Motions that never settle: a ball that hops for ever, one that swings; do others?
-
-* A ball hops while the flow is lowered in held steps. The tops of its hops give period, height,
-  orbit, and by what factor disturbances shrink from hop to hop; the flow at which hops would have
-  no height is extrapolated.
-* The hop is followed along rougher walls to where disturbances grow; on both sides of that wall
-  balls are left alone.
-* Balls that rebound from floor and wall hop, too: they are followed from one coefficient of
-  restitution to the next.
-* A ball swings beside a Hopf point: it slips at both points, and goes round now faster and now
-  slower.
-* Balls in strong drag are run for 60/c, long enough for drag to act: do they go on hopping?
-* On floors so rough (mu > 1) that forces allow rolling and slipping both: what does the ball settle
-  to?"""
+"""Motions that never settle: a ball that hops for ever, one that swings; do others?"""
 
 from __future__ import annotations
 
@@ -66,7 +53,7 @@ disturbances grow is of no clear order there. Chosen after that was seen.)"""
 
 
 def recurrent(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """Hops at flows that fall in steps."""
+    """Hops at flows that fall in held steps."""
     return _hopping(runner, runner.sampling.recurrent_flows, HOPS_DIVISORS)
 
 
@@ -77,7 +64,8 @@ def stepped(runner: Runner, sets: Sets, records: Records) -> Measured:
 
 
 def _hopping(runner: Runner, shares: Sequence[float], divisors: tuple[int, int]) -> Measured:
-    """Period, orbit, height, shrinking of disturbances by flow, and where hopping begins.
+    """Period, orbit, height, shrinking of disturbances by flow, from the tops of hops; and where
+    hopping begins: the flow at which hops would have no height.
 
     At flows that are these shares of that of the set, with so many time steps in a coarse one."""
     p = Parameters.named(SET)
@@ -192,7 +180,9 @@ are short: their starts are extrapolated from one or two hops, which attract fro
 
 
 def followed(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """The wall friction beyond which disturbances grow; do balls hop on, on both sides?"""
+    """The wall friction beyond which disturbances grow; do balls hop on, on both sides?
+
+    A hop is followed along rougher walls to there."""
     p = Parameters.named(SET)
     walls = [p.replace(eta=share * p.eta) for share in WALLS]
     etas = [q.eta for q in walls]
@@ -286,9 +276,10 @@ def death(etas: Sequence[float], factors: Sequence[Sequence[float]]) -> Estimate
 
 
 def swing(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """Period, mean and size of the swing of omega_c, on a very rough floor.
+    """Period, mean and size of the swing of omega_c beside a Hopf point, on a very rough floor.
 
-    With other steps the floor's contact, a hundredth of the weight, opens and closes."""
+    The ball slips at both points. With other steps the floor's contact, a hundredth of the weight,
+    opens and closes."""
     p = sets["reference"].replace(mu=2.5, eta=0.38, c=1.0, omega_0=24.648)
     x0 = State(omega_c=22.39, slip_x=-0.03, slip_z=0.26).stacked()
     pair = StepPair("reference", p, "swing", x0, SWINGING, (60, 80), 12_000)
@@ -354,7 +345,9 @@ def _hops_at_end(runner: Runner, set: str, tasks: list[Task]) -> Measured:
 
 
 def choice(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """Case and omega_c of what a ball settles to from rest, in a flow above omega_01."""
+    """Case and omega_c of what a ball settles to from rest, in a flow above omega_01.
+
+    On floors so rough (mu > 1) that forces allow rolling and slipping both."""
     p = sets["reference"]
     one = {"mu": 1.7222, "eta": 0.0388, "j": 0.482, "r": 0.292 * p.R}
     two = {"mu": 1.2277, "eta": 0.1721, "j": 0.611, "r": 0.154 * p.R}

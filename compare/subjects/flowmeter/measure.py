@@ -1,16 +1,4 @@
-"""The flowmeter: slopes of its curve omega_c(omega_0), hysteresis, unloading, pushes.
-
-* For a slope only the flow is changed: at settled states, across the onset of slipping, and on
-  average from there to unloading.
-* For the loop of Fig. 13 the flow rises and falls in held steps, all in one run: a ramp would
-  overshoot the fold of the slipping branch, where settling slows down without bound. The levels are
-  where cases were seen to change, and between.
-* Unloading (section 5.3): a ball rides the wall a little above the floor while the flow suddenly
-  falls below what holds it there. When does it begin to slip, when does it land, how fast, with
-  what impulse?
-* A ball that the wall carries beside the floor is pushed, upwards or by a little more spin: does it
-  stay off the floor, and how high? An engine may follow motions with landings to first order only.
-"""
+"""The flowmeter: slopes of its curve omega_c(omega_0), hysteresis, unloading, pushes."""
 
 from __future__ import annotations
 
@@ -46,7 +34,9 @@ together."""
 
 
 def slope(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """Slopes at settled states, the jump where slip sets in, the mean to unloading."""
+    """Slopes at settled states, the jump where slip sets in, the mean to unloading.
+
+    Only the flow is changed."""
     most = runner.sampling.slope_slipping
     curves = [curve for name, p in sets.items() for curve in _curves(name, p, records, most)]
     in_order = (_join(runner, curve) for by in SHARP for curve in curves if curve.by == by)
@@ -154,7 +144,11 @@ def _slope(curve: Curve, states: Sequence[SteadyState]) -> Estimate | None:
 
 
 def hysteresis(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """Case and omega_c at every level of the loop, and the case at the level before."""
+    """Case and omega_c at every level of the loop of Fig. 13, and the case at the level before.
+
+    The flow rises and falls in held steps, all in one run: a ramp would overshoot the fold of the
+    slipping branch, where settling slows down without bound. The levels are where cases were seen
+    to change, and between."""
     return together(runner, (_loop(runner, name, p, records) for name, p in sets.items()))
 
 
@@ -234,7 +228,11 @@ WALL_PUSH = 1e-2  # speed of a push in units of sqrt(g R), or more spin in units
 
 
 def unloading(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """How a ball on the wall slips, falls and lands as the flow falls, or is pushed."""
+    """How a ball on the wall slips, falls and lands as the flow falls, or is pushed (section 5.3).
+
+    Unloading: it rides the wall a little above the floor while the flow suddenly falls below what
+    holds it there. Pushed, beside the floor, upwards or by a little more spin: does it stay off the
+    floor, and how high? An engine may follow motions with landings to first order only."""
     starts, pairs = [], []
     for name, p in sets.items():
         if (limit := records.threshold(name, "omega_02")) is None:

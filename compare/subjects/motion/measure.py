@@ -1,31 +1,5 @@
 """The equations of motion in all nine cases, the laws of contact and friction, changes of case,
-landings, and whole motions to their ends.
-
-* `laws`: what holds at every instant. Contacts roll and rub as Table 3 and (14)-(17) say, while
-  balls go through the cases of Fig. 2 and the flow rises and falls; each law is measured at its
-  worst over all samples of a set but those next to a change of case, when friction takes a few
-  steps to build up. (12) and (13) are not measured: what solves for forces in a friction cone can't
-  violate them. And the fluid's drag.
-* `field`: balls start at random states of every case and move freely for a few hundredths of a
-  second. In short windows during which the case does not change, polynomials through the samples
-  give the state, its rate of change and the contact forces at the centre of the window.
-* `motions`: motions from fixed starts are cut into short pieces, each of which begins and ends away
-  from changes of case, at which friction builds up or dies out.
-* `impacts`: a landing is looked at a few steps after the contact has closed, at the same moment
-  with two time steps.
-* `whole_runs`: whole motions from given starts with two time steps; what the step changes is the
-  uncertainty of the finer run.
-  Thrown: the ball flies past the axis of the vessel without touching anything, long enough for drag
-  to show; by the quadratic law with another drag coefficient, too.
-  Pulled off: beside the wall, with a slip on the floor that drives it away from there; its wall
-  contact carries nothing, or almost nothing, and opens.
-  Slips, rolls, sinks: at one contact, at both, or off the wall, for a while, through whatever cases
-  follow; at both points also in a flow that is steady at first, and then rises or falls.
-  Smooth wall: the ball goes round with the fluid, rolls on the floor and spins against a wall
-  without friction, in faster and faster flows. Does the floor hold it?
-  Rough floor, mu > 1: the ball rolls at both points but for a slight slip, in faster and faster
-  flows. It may jam between floor and wall, or the slip may last.
-* `torque`: a ball whose spin a real fluid brakes settles."""
+landings, and whole motions to their ends."""
 
 from __future__ import annotations
 
@@ -93,8 +67,12 @@ motion: a tenth of its share. (Chosen after a measurement.)"""
 
 
 def laws(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """How far each law of contact is off at its worst in motions from three starts, and the speed
-    at which balls sink."""
+    """How far each law of contact is off at its worst, and the speed at which balls sink.
+
+    Contacts roll and rub as Table 3 and (14)-(17) say, while balls go through the cases of Fig. 2
+    and the flow rises and falls: the worst of all samples of a set but those next to a change of
+    case, when friction takes a few steps to build up. (12) and (13) are not measured: what solves
+    for forces in a friction cone can't violate them."""
     yield from _contact_laws(runner, sets)
     yield from _sinking(runner)
 
@@ -226,7 +204,11 @@ MOVING = {
 
 
 def field(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """Rates of change and contact forces, each with the state they belong to."""
+    """Rates of change and contact forces, each with the state they belong to.
+
+    Balls start at random states of every case and move freely for a few hundredths of a second. In
+    short windows during which the case does not change, polynomials through the samples give all
+    of them at the centre of the window."""
     divisors = tuple(STEP_RATIO * times for times in runner.sampling.field_steps)
     pairs = []
     for name, p in sets.items():
@@ -373,7 +355,10 @@ late."""
 
 
 def motions(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """The case at the end of every piece, and how the ball turns there."""
+    """The case at the end of every piece of a motion, and how the ball turns there.
+
+    Motions begin at fixed starts. Each piece is short, and begins and ends away from changes of
+    case, at which friction builds up or dies out."""
     seen: dict[str, set[Case]] = {name: set() for name in sets}
     begun = (_start(*each, *start, "a motion") for each, start in product(sets.items(), STARTS))
     yield from together(runner, (_cut(runner, start, seen[start.set]) for start in begun))
@@ -613,7 +598,16 @@ def torque(runner: Runner, sets: Sets, records: Records) -> Measured:
 
 
 def whole_runs(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """Where each start ends: its state; on smooth walls, rough floors case and orbit."""
+    """Where each start ends: its state; on smooth walls, rough floors case and orbit.
+
+    What the step changes is the uncertainty. Thrown: the ball flies past the axis of the vessel
+    without touching anything, long enough for drag to show. Pulled off: beside the wall, with a
+    slip on the floor that drives it away; its wall contact carries nothing, or almost nothing, and
+    opens. Slips, rolls, sinks: for a while, through whatever cases follow; also in a flow that is
+    steady at first, and then rises or falls. Smooth wall: the ball goes round with the fluid, rolls
+    on the floor and spins against a wall without friction, in faster and faster flows. Does the
+    floor hold it? Rough floor, mu > 1: the ball rolls at both points but for a slight slip. It may
+    jam between floor and wall, or the slip may last."""
     pairs = [pair for name, p in sets.items() for pair in _pairs(name, p)]
     for run in (yield from carry_out(runner, pairs)):
         p, how, coarse, fine = run.pair.p, run.pair.name, run.coarse, run.fine

@@ -1,17 +1,5 @@
 """Which motions there are over planes of parameters, the border between the basins of two, and
-where that is born.
-
-* `planes`: cases reached over the planes of Figs. 7 and 8. In a plane of eta and omega_0 points are
-  spread evenly first; more are put where neighbours differ, each kind of border in turn, and among
-  rare ones.
-* `borders`: where at one flow a ball slips on the floor (SS) or goes round with the fluid (SR,
-  which is NR at y = 0), the straight line between the two states crosses the border between their
-  basins. Two runs close to it on either side stay together for a while near the unstable state. The
-  mean of their states while they are together begins the next line.
-* `birth`: the critical drag, below which slipping at both points ends in a fold, and above which
-  it passes to the wall without a jump. At the end of the branch the floor carries nothing; the sign
-  of the slope of omega_0 over the floor's force there decides whether the branch turns back. States
-  are settled in stronger drag than that, where they last up to the end."""
+where that is born."""
 
 from __future__ import annotations
 
@@ -76,7 +64,11 @@ class Plane:
 
 
 def planes(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """Bit masks of the cases reached, SR counted as NR; without points that don't settle."""
+    """Bit masks of the cases reached over the planes of Figs. 7 and 8, SR counted as NR.
+
+    In a plane of eta and omega_0 points are spread evenly first; more are put where neighbours
+    differ, each kind of border in turn, and among rare ones. Points that don't settle are left
+    out."""
     from scipy.stats import qmc  # slow to import
 
     # In such drag states settle within seconds, and slipping still lasts beyond the flow at which
@@ -152,8 +144,11 @@ SWINGS_ON = "on the border the ball swings on: quadratic drag of a slight lag da
 def borders(runner: Runner, sets: Sets, records: Records) -> Measured:
     """The state on the border between two basins, at flows from omega_02 to omega_04.
 
-    At the quick level the edge is followed to where it begins for the set with most drag alone,
-    which settles soonest."""
+    Where at one flow a ball slips on the floor (SS) or goes round with the fluid (SR, which is NR
+    at y = 0), the straight line between the two states crosses the border between their basins. Two
+    runs close to it on either side stay together for a while near the unstable state. The mean of
+    their states while they are together begins the next line. At the quick level the edge is
+    followed to where it begins for the set with most drag alone, which settles soonest."""
     limits: dict[str, tuple[float, float]] = {}
     for name, p in sets.items():
         holds, folds = (records.threshold(name, omega) for omega in ("omega_02", "omega_04"))
@@ -361,7 +356,11 @@ BEFORE_FOLD = (0.02, 0.035, 0.055, 0.08, 0.12)
 def birth(runner: Runner, sets: Sets, records: Records) -> Measured:
     """The drag at which the fold is born: d omega_0/dA_y of SS is zero at A_y = 0.
 
-    The zero of the straight line through the slopes as a function of 1/c."""
+    Below that drag slipping ends in a fold, and above it passes to the wall without a jump. At the
+    end of the branch the floor carries nothing; the sign of the slope of omega_0 over the floor's
+    force there decides whether the branch turns back. States are settled in stronger drag, where
+    they last up to the end. The zero is that of the straight line through the slopes as a function
+    of 1/c."""
     return together(runner, (_birth(runner, name, p, records) for name, p in sets.items()))
 
 

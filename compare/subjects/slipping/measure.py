@@ -1,22 +1,4 @@
-"""How slip begins: how a slight slip grows, from which flow on, and when a ball leaves the floor.
-
-* `measure`: a rolling ball is given a slip along one direction; in the first milliseconds it grows
-  or dies out. gamma, the initial rate of change of the slip along its direction, is extrapolated
-  from several sizes of the slip to none. A record counts only if all of it is, by the engine's own
-  contacts, in the case in which the ball was to slip; else the case into which it passes is what is
-  measured. States are at random in natural units, and away from stationary ones.
-* `steepest`: out of rolling on the wall alone, slip grows the most where the first harmonic of
-  gamma over all directions is greatest. Its uncertainty is how far the other harmonics may turn
-  that direction.
-* `bounds`: gamma along straight lines of states, its zero and its slope. A ball goes round at a
-  held omega_c in faster and faster flows; or with the flow, rolling at both points or hanging on
-  the wall alone. Two flows show about where gamma passes through zero, and two more are taken
-  around it. gamma is a line in omega_0, or in its square where the orbit goes with it; another law
-  of drag than Stokes' makes it a cubic.
-* `lift` (the dotted arrows of Fig. 6): states of a case differ only in omega_c, from slow, where
-  the floor presses, to fast. A few show roughly where it stops pressing; at slower ones its force
-  is measured and extrapolated to zero as a function of omega_c^2. Out of rolling at both points,
-  where floor and wall share the load in any way, that place is bracketed instead."""
+"""How slip begins: how it grows, from which flow on, and when a ball leaves the floor."""
 
 from __future__ import annotations
 
@@ -90,7 +72,13 @@ FRICTIONLESS = "without friction at both contacts there is nothing that rolls"
 
 
 def measure(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """gamma out of random states, along every arrow; of two sides their shares (69)."""
+    """gamma out of random states, along every arrow; of two sides their shares (69).
+
+    A rolling ball is given a slip along one direction; in the first milliseconds it grows or dies
+    out. gamma, the initial rate of change of the slip along its direction, is extrapolated from
+    several sizes of the slip to none. A record counts only if all of it is, by the engine's own
+    contacts, in the case in which the ball was to slip; else the case into which it passes is
+    measured."""
     rough = yield from _rough(runner, sets)
     pushed = (_grow(pushes) for name, p in rough.items() for pushes in _pushes(runner, name, p))
     yield from together(runner, pushed)
@@ -293,7 +281,10 @@ def start_unit(p: Parameters, x: Array) -> float:
 
 
 def steepest(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """The direction in which slip out of NR grows the most: of the first harmonic."""
+    """The direction in which slip out of NR grows the most.
+
+    It does where the first harmonic of gamma over all directions is greatest. The uncertainty is
+    how far the other harmonics may turn that direction."""
     rough = {name: p for name, p in sets.items() if p.eta and p.c}
     why = "without friction at the wall, or drag, no direction stands out"
     yield from (runner.missing(name, why) for name in sets if name not in rough)
@@ -352,7 +343,10 @@ HANGING = (1.05, 1.6, 1.3)
 
 
 def bounds(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """Zero and slope of gamma along every line: from two flows, then two more at the zero."""
+    """Zero and slope of gamma along every line: from two flows, then two more at the zero.
+
+    A ball goes round at a held omega_c in faster and faster flows; or with the flow, rolling at
+    both points or hanging on the wall alone."""
     rough = yield from _rough(runner, sets)
     rolling = [_cross(each) for name in rough for each in _lines(runner, name, rough[name])]
     hanging = [_cross_hanging(runner, name, p, records) for name, p in rough.items()]
@@ -379,8 +373,8 @@ def _cross(pushes: Sequence[Push], more: Sequence[Push] = ()) -> Procedure[None]
     """Zero and slope of gamma along a line of states, from pushes at two flows, and from `more`, or
     where the first two show the zero.
 
-    gamma is a line in omega_0, or in its square where the orbit goes with it; but drag that isn't
-    linear in the lag bends it."""
+    gamma is a line in omega_0, or in its square where the orbit goes with it; another law of drag
+    than Stokes' makes it a cubic."""
     push = pushes[0]
     power = 1 if push.start.name == "held" else 2
     curved = power == 1 and push.start.p.drag != STOKES
@@ -509,7 +503,12 @@ LIFT_DEGREES = (3, 2)  # of the polynomials; the lower one shows what the degree
 
 
 def lift(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """omega_c at which the ball leaves the floor, along every arrow; or that it doesn't."""
+    """omega_c at which the ball leaves the floor, along every arrow; or that it doesn't.
+
+    States of a case differ only in omega_c, from slow, where the floor presses, to fast. A few show
+    roughly where it stops pressing; at slower ones its force is measured and extrapolated to zero
+    as a function of omega_c^2. Out of rolling at both points, where floor and wall share the load
+    in any way, that place is bracketed instead."""
     arrows = (Arrow(runner, name, p, *arrow) for name, p in sets.items() for arrow in ARROWS)
     yield from together(runner, map(_lift, arrows))
 

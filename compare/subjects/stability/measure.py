@@ -121,9 +121,10 @@ class Pushed:
     @property
     def sizes(self) -> tuple[float, ...]:
         """Sizes of the pushes: the first with the coarser step, then the largest first."""
-        size = PUSH.get(self.case, SLIGHT_PUSH if self.bends else USUAL_PUSH)
-        extrapolated = self.case in PUSH or self.bends
-        return (size / 2, size, size / 2) if extrapolated else (size / 2, size)
+        if not self.bends and self.case not in PUSH:
+            return USUAL_PUSH / 2, USUAL_PUSH
+        size = PUSH.get(self.case, SLIGHT_PUSH)
+        return size / 2, size, size / 2
 
     def solver_error(self, record: Array, lag: int) -> float:
         """Standard uncertainty of a response `lag` samples later, from the accuracy of forces.
@@ -140,11 +141,6 @@ class Pushed:
         sampling, step = self.runner.sampling, coarse_step(self.start.p)
         divisors = sampling.rates_SR if self.case is Case.SR else sampling.rates_divisors
         return step / divisors[0], step / divisors[1]
-
-    @property
-    def too_hard(self) -> bool:
-        """Whether the push that the case asks for is too large for the drag: see `NOT_LINEAR`."""
-        return self.case in PUSH and self.bends
 
     @property
     def fast(self) -> bool:
@@ -166,7 +162,7 @@ class Pushed:
 
     def answer(self) -> Procedure[None]:
         """The exponents of the state, and how it answers each push."""
-        if self.too_hard:
+        if self.case in PUSH and self.bends:  # that push is too large
             yield self.missing(NOT_LINEAR, 2 * len(self.active) + len(self.active) ** 2)
             return
         tasks, count, (_, step) = self.tasks(), 2 * len(self.active), self.steps

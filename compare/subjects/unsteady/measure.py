@@ -1,16 +1,4 @@
-"""Flows that change: pulsation, jumps, ramps.
-
-* A ball rolls in a pulsating flow: how it follows, at which amplitude it slips, what it then reads
-  on average. A small pulsation about a fixed part of the flow at which two-point rolling ends shows
-  how the ball follows; every other run starts from there, so that it need not settle. With Stokes'
-  law the response is linear; with another one the amplitude is raised step by step until the ball
-  slips, and each time settled anew. The ball slips where the engine shows slip at both contacts.
-  Frequencies are powers of two. About other flows it is driven strongly, to slip at the wall alone
-  or at both points.
-* The flow changes once by a small jump. Half the difference of two runs, after a jump up and one
-  down, is free of what goes with the square of the jump.
-* A ramp starts from settled slipping well below the end of it, and ends well above; the ball has
-  left slipping once it lags by half as much as at first."""
+"""Flows that change: pulsation, jumps, ramps."""
 
 from __future__ import annotations
 
@@ -68,7 +56,13 @@ OCTAVE = 3  # octaves above the lowest frequency at which it is driven so
 
 
 def pulsation(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """Gain and phase of rolling; the amplitude at which slip begins; the mean reading beyond it."""
+    """Gain and phase of rolling; the amplitude at which slip begins; the mean reading beyond it.
+
+    A small pulsation about a fixed part of the flow at which two-point rolling ends shows how the
+    ball follows; every other run starts from there, so that it need not settle. With Stokes' law
+    the response is linear; with another one the amplitude is raised step by step until the ball
+    slips, and each time settled anew. It slips where the engine shows slip at both contacts. About
+    other flows it is driven strongly, to slip at the wall alone or at both points."""
     driven, strong = list[Procedure[None]](), list[Procedure[None]]()
     for name, p in sets.items():
         if (end := records.threshold(name, "omega_01")) is None:
@@ -321,7 +315,11 @@ def _slips(cases: npt.NDArray[np.int8]) -> str:
 
 
 def jumps(runner: Runner, sets: Sets, records: Records) -> Measured:
-    """Delay, peak and height after jumps, rolling and slipping; where a ramp ends slip."""
+    """Delay, peak and height after jumps, rolling and slipping; where a ramp ends slip.
+
+    Half the difference of two runs, after a small jump up and one down, is free of what goes with
+    the square of the jump. A ramp starts from settled slipping well below the end of it, and ends
+    well above; the ball has left slipping once it lags by half as much as at first."""
     pairs, slipping = list[StepPair](), list[tuple[Start, float, float]]()
     for name, p in sets.items():
         slips, carries, folds = (records.threshold(name, f"omega_0{n}") for n in (1, 2, 4))
