@@ -17,12 +17,11 @@ from compare.method.record import Measurement, state
 from compare.method.settling import forces
 from compare.method.statistics import Estimate
 from compare.subjects.motion import measure as moving
-from compare.verification.claim import Criterion, Text, claim, criteria, given
+from compare.verification.claim import Criterion, Text, all_of, claim, criteria, given
 from compare.verification.judge import RTOL, integrated, simulated, theory
-from compare.verification.states import exists
+from compare.verification.states import by_stokes, exists
 from model import Case, Trajectory
 from model.cases import TRAITS
-from model.drag import STOKES
 from model.kinematics import TURNING, VARIABLES
 
 _OWN = (
@@ -65,9 +64,8 @@ def _end_states(*starts: str) -> tuple[Criterion, ...]:
     def starts_so(m: Measurement) -> bool:
         return m.at["start"] in starts
 
-    return criteria(
-        "runs", [f"end_{name}" for name in VARIABLES], _end_of_motion, when=starts_so, by=_RUN
-    )
+    ends = [f"end_{name}" for name in VARIABLES]
+    return criteria("runs", ends, _end_of_motion, when=starts_so, by=_RUN)
 
 
 def _is_stable(case: Case, m: Measurement) -> bool:
@@ -119,6 +117,12 @@ def _end_in_case(m: Measurement) -> Estimate:
     return integrated(value, quantity(m.quantity).size(m.parameters))
 
 
+def _ratio(contact: str, coefficient: Callable[[Measurement], float]) -> Criterion:
+    """A criterion on the friction of a contact that slips, divided by its load."""
+    when = given(contact=contact)
+    return Criterion("laws", "friction_ratio", coefficient, when=when, by="(14), (15)")
+
+
 LAW_CLAIMS = (
     claim(
         "table-3",
@@ -128,15 +132,8 @@ LAW_CLAIMS = (
         "and that friction stays within its limit, (12) and (13), is built into any solver of "
         "friction cones: it is not counted.)",
         Criterion("laws", "law_in_motion", lambda m: 0.0, by="Table 3, (14)-(17)"),
-        *(
-            Criterion(
-                "laws", "friction_ratio", coefficient, when=given(contact=contact), by="(14), (15)"
-            )
-            for contact, coefficient in (
-                ("A", lambda m: m.parameters.mu),
-                ("B", lambda m: m.parameters.eta),
-            )
-        ),
+        _ratio("A", lambda m: m.parameters.mu),
+        _ratio("B", lambda m: m.parameters.eta),
     ),
     claim(
         "eq-10",
@@ -164,7 +161,7 @@ LAW_CLAIMS = (
             "runs",
             "end_y",
             _fallen,
-            when=lambda m: m.at["start"] == "thrown" and m.parameters.drag == STOKES,
+            when=all_of(given(start="thrown"), by_stokes),
             by="analytic.mechanics.drag.fall_time",
         ),
         reason=_OWN,

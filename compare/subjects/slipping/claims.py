@@ -153,29 +153,25 @@ def _growth(arrow: tuple[Case, Case]) -> Iterator[Criterion]:
         yield Criterion(protocol, "case", _following_case, when=when, by="analytic.simulate")
 
 
-def _lifts(m: Measurement) -> float:
-    """Whether the wall alone would accelerate the ball upwards."""
-    return slip_stability.lift_acceleration(*_arrow(m), _state(m), m.parameters) > 0
+def _lift(inner: Case, outer: Case) -> Iterator[Criterion]:
+    """Criteria on whether the wall alone would accelerate a ball upwards out of a case, from where
+    on, and on what the floor carries of it."""
 
+    def lifts(m: Measurement) -> float:
+        return slip_stability.lift_acceleration(inner, outer, _state(m), m.parameters) > 0
 
-def _lift_onset(m: Measurement) -> float:
-    """Where that begins."""
-    return slip_stability.lift_onset(*_arrow(m), _state(m), m.parameters)
+    def onset(m: Measurement) -> float:
+        return slip_stability.lift_onset(inner, outer, _state(m), m.parameters)
 
+    def force(m: Measurement) -> float:
+        return float(analytic.contact_forces(inner, _state(m), m.parameters)[0][1])
 
-def _moving_force(m: Measurement) -> float:
-    """What the floor carries of a ball that moves, N."""
-    return float(analytic.contact_forces(_arrow(m)[0], _state(m), m.parameters)[0][1])
-
-
-def _lift(inner: Case) -> Iterator[Criterion]:
-    """Criteria on whether and where the ball lifts out of a case, and on the floor's force."""
     lift = partial(Criterion, "lift", when=given(inner=inner.name))
-    yield lift("lifts", _lifts, by="slip_stability: lift")
+    yield lift("lifts", lifts, by="slip_stability: lift")
     if inner is not Case.RS:
-        yield lift("lift_onset", _lift_onset, by="slip_stability: lift")
+        yield lift("lift_onset", onset, by="slip_stability: lift")
     if inner is not Case.RR:
-        yield lift("moving_force_Ay", _moving_force, by="analytic.contact_forces")
+        yield lift("moving_force_Ay", force, by="analytic.contact_forces")
 
 
 CLAIMS = (
@@ -305,7 +301,7 @@ CLAIMS = (
             if inner is Case.RS
             else f"Out of {inner.name} the ball lifts off the floor once the wall alone, in "
             f"{outer.name}, would accelerate it upwards.",
-            *_lift(inner),
+            *_lift(inner, outer),
         )
         for inner, outer in slip_stability.LIFT_ARROWS
     ),

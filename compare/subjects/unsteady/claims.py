@@ -10,12 +10,11 @@ import analytic
 from analytic.flowmeter import pulsation, response
 from compare.method.record import Measurement, Relation, state
 from compare.method.statistics import Estimate
-from compare.subjects.unsteady.measure import caught_up
-from compare.verification.claim import Criterion, claim, criteria, given
+from compare.subjects.unsteady.measure import AT_BOTH, AT_ONE, caught_up
+from compare.verification.claim import Criterion, all_of, claim, criteria, given
 from compare.verification.judge import integrated, simulated, theory
-from compare.verification.states import lifts_first, slips_first
+from compare.verification.states import by_stokes, lifts_first, slips_first
 from model import Case, Flow
-from model.drag import STOKES
 
 _BY = "analytic.flowmeter"
 _RATE = f"{_BY}.response.rolling_rate"
@@ -23,7 +22,7 @@ _RATE = f"{_BY}.response.rolling_rate"
 
 def _followed(m: Measurement) -> Estimate:
     """Gain, or phase lag, rad, of omega_c in a pulsation, while the ball rolls."""
-    if m.parameters.drag == STOKES:
+    if by_stokes(m):
         ratio, left_out = complex(theory(response.transfer, m.parameters, Case.RR, m.at["f"])), 0.0
     else:
         ratio = theory(pulsation.first_harmonic, m.parameters, m.at["amplitude"], m.at["f"])
@@ -79,7 +78,6 @@ def _lowest_flow(m: Measurement) -> float:
     return p.omega_0 - pulsation.slow_onset(p)
 
 
-_BOTH, _ONE = "at both points", "at one point"
 _HELD = given(inner="RR", outer="RS", by="held")
 _SLOW, _FAST, _MEAN = (
     f"{_BY}.pulsation.{function}" for function in ("slow_onset", "fast_onset", "mean_error")
@@ -151,11 +149,11 @@ CLAIMS = (
         "A pulsation that makes the ball slip at both points makes its mean reading low: on "
         "average its spin about the tangent takes drag. One that makes it slip at the wall alone "
         "does not change the mean, under Stokes' law.",
-        _mean(_mean_error, when=given(slips=_BOTH), by=_MEAN),
-        _mean(_mean_error, when=given(slips=_ONE), size=_flow, by=_MEAN),
+        _mean(_mean_error, when=given(slips=AT_BOTH), by=_MEAN),
+        _mean(_mean_error, when=given(slips=AT_ONE), size=_flow, by=_MEAN),
         _mean(
             lambda m: 0.0,
-            when=lambda m: m.at["slips"] == _ONE and m.parameters.drag == STOKES,
+            when=all_of(given(slips=AT_ONE), by_stokes),
             size=_flow,
             by="the balance of spin, docs/theory.md, 11",
         ),

@@ -52,6 +52,7 @@ STRONG = ((0.25, 4.0), (0.4, 4.0), (0.6, 5.5), (0.75, 4.0))
 """Flows, in units of that at which rolling ends, about which the ball is driven by an amplitude in
 units of the flow: it slips at the wall alone about the slow ones, at both points about the
 others."""
+AT_BOTH, AT_ONE = "at both points", "at one point"  # where it slips in a period
 OCTAVE = 3  # octaves above the lowest frequency at which it is driven so
 
 
@@ -310,8 +311,8 @@ def _slips(cases: npt.NDArray[np.int8]) -> str:
     if any(Contact.N in (case.A, case.B) for case in seen):
         return "off the floor or the wall"
     if Case.SS in seen:
-        return "at both points"
-    return "at one point" if seen - {Case.RR} else "nowhere"
+        return AT_BOTH
+    return AT_ONE if seen - {Case.RR} else "nowhere"
 
 
 def jumps(runner: Runner, sets: Sets, records: Records) -> Measured:
