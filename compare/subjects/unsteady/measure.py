@@ -19,18 +19,17 @@ from compare.method.protocol import Protocol
 from compare.method.quantities import QUANTITIES
 from compare.method.record import Measured, Measurement, Missing, Records, Sets, if_found
 from compare.method.runner import Runner, coarse_step
-from compare.method.settling import rounded_duration, settle
+from compare.method.settling import rounded_duration
 from compare.method.statistics import COVERAGE, Estimate, estimate, peaks, top, uniform
 from compare.method.step_pairs import (
     Start,
     StepPair,
     StepPairResult,
     at_zero_step,
-    carry_out,
     constrained,
     of_no_order,
 )
-from compare.method.together import Procedure, asked, narrowed, together
+from compare.method.together import Procedure, asked, narrowed, settled, stepped, together
 from model import Case, Contact, Flow, Parameters, State, Trajectory
 from model.arrays import Array
 from model.drag import STOKES
@@ -321,38 +320,40 @@ def jumps(runner: Runner, sets: Sets, records: Records) -> Measured:
     Half the difference of two runs, after a small jump up and one down, is free of what goes with
     the square of the jump. A ramp starts from settled slipping well below the end of it, and ends
     well above; the ball has left slipping once it lags by half as much as at first."""
-    pairs, slipping = list[StepPair](), list[tuple[Start, float, float]]()
-    for name, p in sets.items():
-        slips, carries, folds = (records.threshold(name, f"omega_0{n}") for n in (1, 2, 4))
-        if slips is None or carries is None:
-            yield runner.missing(name, "no flows between which the ball slips at both points")
-            continue
-        begins, holds = slips.value, carries.value
-        if p.drag == STOKES:  # with other laws the delay depends on the size of the jump
-            q = p.replace(omega_0=ROLLS_AT * begins)
-            rolls = Start(name, q, "RR", State(omega_c=q.omega_0).stacked())
-            pairs.append(_jump(runner, rolls, JUMP * q.omega_0))
-        # from rest, to settle slipping before a jump or a ramp, between two flows
-        q = p.replace(omega_0=begins + SLIPS_AT * (holds - begins))
-        slipping.append((Start(name, q, "SS", np.zeros(8)), begins, holds))
-        if folds is None:
-            yield runner.missing(name, "no flow at which slipping at both points ends in a jump")
-        else:
-            q = p.replace(omega_0=begins + RAMP[0] * (folds.value - begins))
-            slipping.append((Start(name, q, "ramp", np.zeros(8)), begins, folds.value))
-    states = settle(runner, [start for start, *_ in slipping])
-    for (start, begins, ends), state in zip(slipping, states, strict=True):
+    return together(runner, (_change(runner, name, p, records) for name, p in sets.items()))
+
+
+def _change(runner: Runner, name: str, p: Parameters, records: Records) -> Procedure[None]:
+    """Jumps and ramps of a set."""
+    slips, carries, folds = (records.threshold(name, f"omega_0{n}") for n in (1, 2, 4))
+    if slips is None or carries is None:
+        yield runner.missing(name, "no flows between which the ball slips at both points")
+        return
+    begins, holds, pairs = slips.value, carries.value, list[StepPair]()
+    if p.drag == STOKES:  # with other laws the delay depends on the size of the jump
+        q = p.replace(omega_0=ROLLS_AT * begins)
+        rolls = Start(name, q, "RR", State(omega_c=q.omega_0).stacked())
+        pairs.append(_jump(runner, rolls, JUMP * q.omega_0))
+    # from rest, to settle slipping before a jump or a ramp
+    flows = {"SS": begins + SLIPS_AT * (holds - begins)}
+    if folds is None:
+        yield runner.missing(name, "no flow at which slipping at both points ends in a jump")
+    else:
+        flows["ramp"] = begins + RAMP[0] * (folds.value - begins)
+    starts = [Start(name, p.replace(omega_0=flow), of, np.zeros(8)) for of, flow in flows.items()]
+    (states,) = yield from settled(starts)
+    for start, state in zip(starts, states, strict=True):
         if not state.settled_in(Case.SS):
             why = state.failure or state.case.name
-            yield runner.missing(start.set, f"no settled slipping to start from: {why}")
+            yield runner.missing(name, f"no settled slipping to start from: {why}")
             continue
         # At both walls to the last digit.
         begun = replace(start, x0=constrained(Case.SS, state.mean, start.p))
-        if start.name == "ramp":
-            pairs += _ramps(runner, begun, begins, ends)
-        else:
-            pairs.append(_jump(runner, begun, JUMP / 3 * (ends - begins)))
-    for result in (yield from carry_out(runner, pairs)):
+        if start.name == "SS":
+            pairs.append(_jump(runner, begun, JUMP / 3 * (holds - begins)))
+        elif folds:
+            pairs += _ramps(runner, begun, begins, folds.value)
+    for result in (yield from stepped(*pairs)):
         yield from _rows(result)
 
 
