@@ -8,6 +8,7 @@ simulation."""
 from __future__ import annotations
 
 import base64
+import dataclasses
 import errno
 import json
 import signal
@@ -52,6 +53,9 @@ FETCHED = 60.0
 """How long a page is kept that no browser connects to, s."""
 OIL = 1e-5
 """Viscosity of the fluid, m2 s-1, for laws of drag that need one where the set has none."""
+UNSAID = Parameters.named("reference")
+"""The set whose values an address leaves out, whatever the page began with: a link is a setting,
+also for somebody else."""
 SLIDERS: dict[str, tuple[str, float, float, float]] = {
     "mu": ("friction of the floor μ", 0.0, 1.2, 0.01),
     "eta": ("friction of the wall η", 0.0, 1.2, 0.01),
@@ -93,21 +97,29 @@ def with_value(p: Parameters, name: str, value: float | str) -> Parameters:
     return p.replace(**{name: value}, **more)
 
 
-def address(tab: Tab, first: Parameters) -> str:
-    """What the address of the page says: all that is not as it was `first`, and the start."""
-    kept = {name: f"{getattr(tab.p, name):.6g}" for name in SLIDERS} | {"drag": tab.p.drag}
-    was = {name: f"{getattr(first, name):.6g}" for name in SLIDERS} | {"drag": first.drag}
-    said = {name: value for name, value in kept.items() if value != was[name]}
+def address(tab: Tab) -> str:
+    """What the address of the page says: all that is not as in `UNSAID`, the flow, and the
+    start."""
+    said = {
+        name: f"{value:.12g}" if isinstance(value, float) else value
+        for name, value in dataclasses.asdict(tab.p).items()
+        if value != getattr(UNSAID, name) or name == "omega_0"
+    }
     if tab.start.omega_c:
         said["start"] = f"{float(tab.start.omega_c):.6g}"
-    return f"/?{urlencode(said)}" if said else "/"
+    return f"/?{urlencode(said)}"
 
 
 def set_from(tab: Tab, said: Mapping[str, str]) -> None:
     """Set a tab as an address says; raises `InputError` for what can't be."""
-    for name in (name for name in [*SLIDERS, "drag"] if name in said):
-        value = said[name] if name == "drag" else parse_number(name, said[name], "1", REACH)
-        tab.p = with_value(tab.p, name, value)
+    values: dict[str, Any] = {
+        q.name: parse_number(q.name, said[q.name], q.metadata["unit"], REACH)
+        for q in Parameters.quantities()
+        if q.name in said
+    }
+    values |= {"drag": said["drag"]} if "drag" in said else {}
+    if values:
+        tab.p = UNSAID.replace(**values)
     if "start" in said:
         tab.start = State(omega_c=parse_number("start", said["start"], "rad s-1", REACH))
 
@@ -335,7 +347,7 @@ def page(p: Parameters) -> None:
     here = ui.context.client
 
     def keep_address() -> None:
-        here.run_javascript(f"history.replaceState(null, '', {json.dumps(address(tab, p))})")
+        here.run_javascript(f"history.replaceState(null, '', {json.dumps(address(tab))})")
 
     draw.append(keep_address)
     follow()

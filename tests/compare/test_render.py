@@ -2,6 +2,7 @@
 why they can't."""
 
 import base64
+import dataclasses
 import io
 import signal
 import socket
@@ -245,7 +246,7 @@ def test_a_link_is_a_setting_and_a_telephone_shows_all(browser, address):
     number = page.locator("input[type=number]").last
     number.fill("12")
     number.press("Tab")
-    page.wait_for_function("location.search == '?eta=0.25&start=5'")
+    page.wait_for_function("location.search == '?eta=0.25&omega_0=12&start=5'")
     page.goto(f"{address}?mu=-3")
     page.wait_for_selector("text=The address can't be followed: mu = -3 is out of range")
     shows(page, ".said", "RR at ωc = 12")
@@ -333,12 +334,14 @@ def test_every_set_has_its_figures_and_a_motion(changes):
 
 
 def test_an_address_tells_a_setting():
-    tab = explore.Tab(P)
-    assert explore.address(tab, P) == "/"
-    said = {"mu": "0.3", "kappa": "0.5", "omega_0": "25", "drag": "quadratic", "start": "5"}
-    explore.set_from(tab, said | {"other": "1"})
-    assert (tab.p.mu, tab.p.omega_0, tab.start.omega_c) == (0.3, 25.0, 5.0)
-    assert dict(parse_qsl(explore.address(tab, P)[2:])) == said
+    """Whatever set another page began with."""
+    water = Parameters.named("steel-in-water").replace(mu=0.3)
+    for p in (P, water, P.replace(omega_0=25.0, nu_f=1e-6, drag="quadratic")):
+        said = explore.address(explore.Tab(p, State(omega_c=5.0)))
+        tab = explore.Tab(Parameters.named("hopping"))
+        explore.set_from(tab, dict(parse_qsl(said[2:])) | {"other": "1"})
+        assert dataclasses.astuple(tab.p) == pytest.approx(dataclasses.astuple(p), rel=1e-11)
+        assert tab.start.omega_c == 5.0
     for name, value in (("mu", "x"), ("mu", "-1"), ("start", "nan"), ("drag", "mine")):
         with pytest.raises(InputError, match=name):
             explore.set_from(explore.Tab(P), {name: value})
