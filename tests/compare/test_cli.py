@@ -100,7 +100,7 @@ def test_a_foreign_model_is_named(tmp_path, monkeypatch):
     python("-m", "compare", "--version")
 
 
-def test_a_run_is_described_as_it_is_stored_whole_and_in_parts(tmp_path, monkeypatch, capsys):
+def test_a_run_is_described_as_it_is_stored(tmp_path, capsys):
     run = tmp_path / "run.h5"
     printed = told(capsys, f"simulate --omega-0 25 --time 2 -o {run} --json")
     about, kept = json.loads(printed), storage.load(run)
@@ -108,7 +108,6 @@ def test_a_run_is_described_as_it_is_stored_whole_and_in_parts(tmp_path, monkeyp
     assert len(about["cases"]) > 1
     assert about["last"]["omega_c"] == kept.omega_c[-1]
     assert "omega_0 = 25" in told(capsys, f"inspect {run}")
-    monkeypatch.setattr("compare.view.motions.PART", 7)
     assert told(capsys, f"inspect {run} --json") == printed
 
 
