@@ -36,14 +36,11 @@ class Level(IntEnum):
     FULL = 2
 
 
-Names = tuple[str, ...]
-"""Of parameter sets."""
-ONE_BALL = ("reference",)
-"""For what one ball shows as well as many, or the paper draws for one."""
+Names = tuple[str, ...]  # of parameter sets
+ONE_BALL = ("reference",)  # for what one ball shows as well as many, or the paper draws for one
 ENDS_OF_ROLLING = (*ONE_BALL, "high-wall-friction")
 """One ball that comes to slip on the floor, and one that the wall's friction lifts first."""
-DRAG_LAWS = (*ONE_BALL, "wake", "blunt")
-"""One for each law of drag."""
+DRAG_LAWS = (*ONE_BALL, "wake", "blunt")  # one for each law of drag
 LIMIT_SETS = (*ENDS_OF_ROLLING, "rough-floor", "wake")
 """Also a floor on which balls slip, or ride the wall, at one flow; and another law of drag."""
 VARIED = (*ENDS_OF_ROLLING, "rough-floor", "thick-fluid", "wake", "blunt", "rubber-wall")
@@ -87,8 +84,7 @@ class Entry:
     """Processor time at the quick level on some machine, of the engine on trial."""
 
 
-LAWLESS = 0.25
-"""Processor time of a step without the law, divided by that of one with it."""
+LAWLESS = 0.25  # processor time of a step without the law, divided by that of one with it
 HOPS = "hops that last are those of the set hopping"
 # fmt: off
 PLAN: dict[str, Entry] = {

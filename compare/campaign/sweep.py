@@ -13,8 +13,7 @@ from model import InputError, Parameters
 from model.arrays import Array
 from model.parameters import Range, check_names, check_number, parse_number
 
-MOST = 100_000
-"""Most runs of a sweep."""
+MOST = 100_000  # most runs of a sweep
 FIELDS = {field.name: field.metadata["unit"] for field in Parameters.quantities()}
 """Units of the parameters."""
 

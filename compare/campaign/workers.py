@@ -31,10 +31,8 @@ Spread = Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[Any]]
 JUDGING = 30.0
 """Processor time that judging a claim or drawing a figure may take, s: thirty times what the
 longest takes at the quick level. What files say may be nonsense that takes years."""
-SCHEDULER_TIMEOUT = 10.0
-"""How long a scheduler has to answer, s."""
-ASLEEP = 1.0
-"""How long a thread that waits sleeps at a stretch, s."""
+SCHEDULER_TIMEOUT = 10.0  # how long a scheduler has to answer, s
+ASLEEP = 1.0  # how long a thread that waits sleeps at a stretch, s
 
 
 @dataclass(eq=False)

@@ -45,8 +45,7 @@ from model import InputError, Parameters
 from model.errors import suggestion
 from model.kinematics import VARIABLES, state_units
 
-Scale = Callable[[Parameters], float]
-"""A natural size, by a parameter set."""
+Scale = Callable[[Parameters], float]  # a natural size, by a parameter set
 
 
 @dataclass(frozen=True)
@@ -173,8 +172,7 @@ _ALL = (
     Quantity("jump_height", "height of the peak after a jump", "1", 1e-2),
     Quantity("ramp_end", "ω₀ at which a ramp has halved the lag", "rad s-1", 2e-2),
 )
-QUANTITIES: dict[str, Quantity] = {each.name: each for each in _ALL}
-"""Every quantity by name."""
+QUANTITIES: dict[str, Quantity] = {each.name: each for each in _ALL}  # every quantity by name
 
 
 def quantity(name: str) -> Quantity:

@@ -242,10 +242,8 @@ class Records:
         return Estimate(best.value, best.uncertainty) if best else None
 
 
-Sets = Mapping[str, Parameters]
-"""What a protocol measures, by name."""
-Measured = Iterator[Measurement | Missing]
-"""What it yields."""
+Sets = Mapping[str, Parameters]  # what a protocol measures, by name
+Measured = Iterator[Measurement | Missing]  # what it yields
 T = TypeVar("T")
 Found = Generator[Missing, None, T]
 """What a step of a protocol comes to, as in ``results = yield from carry_out(runner, pairs)``; what

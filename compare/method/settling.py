@@ -22,14 +22,11 @@ from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
 from model.drag import STOKES
 
-PRESSES = 0.05
-"""Normal force, in weights, above which friction is looked at: less may hover."""
-SPIN = 1.0
-"""Spin slip_y of a ball in a fluid at rest, in units of sqrt(g/R) R/r."""
+PRESSES = 0.05  # normal force, in weights, above which friction is looked at: less may hover
+SPIN = 1.0  # spin slip_y of a ball in a fluid at rest, in units of sqrt(g/R) R/r
 SPAN = 40.0
 """Least length of a round in units of 1/c, the time in which the fluid stops a free ball."""
-LONGEST = 2.0
-"""Length of the longest round in units of `SPAN`."""
+LONGEST = 2.0  # length of the longest round in units of `SPAN`
 SHORT = (1 / 64, 1 / 8)
 """Rounds before those where the law isn't Stokes': other drag laws are stronger, so balls settle
 sooner. The drift limit of such a round is reduced in proportion to its length."""
