@@ -36,11 +36,11 @@ class Level(IntEnum):
     FULL = 2
 
 
-Names = tuple[str, ...]  # of parameter sets
-ONE_BALL = ("reference",)  # for what one ball shows as well as many, or the paper draws for one
+Names = tuple[str, ...]  #: of parameter sets
+ONE_BALL = ("reference",)  #: for what one ball shows as well as many, or the paper draws for one
 ENDS_OF_ROLLING = (*ONE_BALL, "high-wall-friction")
 """One ball that comes to slip on the floor, and one that the wall's friction lifts first."""
-DRAG_LAWS = (*ONE_BALL, "wake", "blunt")  # one for each law of drag
+DRAG_LAWS = (*ONE_BALL, "wake", "blunt")  #: one for each law of drag
 LIMIT_SETS = (*ENDS_OF_ROLLING, "rough-floor", "wake")
 """Also a floor on which balls slip, or ride the wall, at one flow; and another law of drag."""
 VARIED = (*ENDS_OF_ROLLING, "rough-floor", "thick-fluid", "wake", "blunt", "rubber-wall")
@@ -62,21 +62,16 @@ class Entry:
     these are the first `MOST_LIMIT_SETS`, and `reference` alone where none is named here."""
     steps: tuple[int, int] = (3, 3)
     """With how many of its time steps it does, the coarsest first: at quick, and above."""
-    as_it_comes: Names = ()
-    """Sets that an engine with its own settings measures, at every level."""
-    free: Names = ()
-    """Sets that the ball as a free body measures, above the quick level."""
+    as_it_comes: Names = ()  #: sets that an engine with its own settings measures, at every level
+    free: Names = ()  #: sets that the ball as a free body measures, above the quick level
     _: KW_ONLY
-    level: Level = Level.QUICK
-    """The least level of which the protocol is a part."""
+    level: Level = Level.QUICK  #: the least level of which the protocol is a part
     by: Engine | None = None
     """Who measures, where it isn't the engine on trial; engines beside that one then don't."""
-    settles: bool = True
-    """Whether it needs motions that settle."""
+    settles: bool = True  #: whether it needs motions that settle
     seeded: bool = False
     """Whether an engine beside the one on trial looks where that one found something."""
-    only: str = ""
-    """Why it needs the set `reference`, and no other; empty if it takes all sets."""
+    only: str = ""  #: why it needs the set `reference`, and no other; empty if it takes all sets
     numbers: int = 1
     """How many numbers there must be of a set at the quick level with the protocol's own time step,
     or reasons: the least that any set has by MuJoCo, event-driven simulation or time stepping."""
@@ -84,7 +79,7 @@ class Entry:
     """Processor time at the quick level on some machine, of the engine on trial."""
 
 
-LAWLESS = 0.25  # processor time of a step without the law, divided by that of one with it
+LAWLESS = 0.25  #: processor time of a step without the law, divided by that of one with it
 HOPS = "hops that last are those of the set hopping"
 # fmt: off
 PLAN: dict[str, Entry] = {

@@ -90,14 +90,10 @@ class Study:
 
     output: Path
     level: Level
-    engines: Sequence[Engine]
-    """The one on trial first."""
-    claims: Sequence[Claim]
-    """Those that are to be judged."""
-    protocols: Sequence[Protocol]
-    """Those that they need, in the order in which they begin."""
-    sets: Mapping[str, Parameters] | None
-    """In the place of those that are planned."""
+    engines: Sequence[Engine]  #: the one on trial first
+    claims: Sequence[Claim]  #: those that are to be judged
+    protocols: Sequence[Protocol]  #: those that they need, in the order in which they begin
+    sets: Mapping[str, Parameters] | None  #: in the place of those that are planned
 
     def jobs(self, campaign: Campaign, protocols: Sequence[Protocol] | None = None) -> list[Job]:
         """Every protocol by every engine with every step that is planned."""
@@ -150,10 +146,8 @@ def plan(
 class SoFar:
     """What has been measured so far."""
 
-    records: dict[str, dict[int, Records]]
-    """By engine, the one on trial first, and step divisor."""
-    waiting: Counter[str]
-    """How often a protocol is still to be carried out."""
+    records: dict[str, dict[int, Records]]  #: by engine, the one on trial first, and step divisor
+    waiting: Counter[str]  #: how often a protocol is still to be carried out
     broken: dict[str, str] = field(default_factory=dict)
     """Errors of protocols of the engine on trial: each takes its own claims with it."""
 

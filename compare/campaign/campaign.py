@@ -34,9 +34,9 @@ from model.files import make_directory, remove_leftovers, write_text
 from model.parameters import POSITIVE, Range, check_number
 from model.versions import current_versions
 
-BATCH = 64  # most runs that a process takes at once, and stores in one file
-MOST_STEPS = 3e5  # of a batch of several runs: some seconds, so that progress is told
-HELD = 2**16  # most samples of a batch, some 11 MB; a run with more is one by itself
+BATCH = 64  #: most runs that a process takes at once, and stores in one file
+MOST_STEPS = 3e5  #: of a batch of several runs: some seconds, so that progress is told
+HELD = 2**16  #: most samples of a batch, some 11 MB; a run with more is one by itself
 READ = 2**19
 """Samples held in memory, some 90 MB: most runs are looked at soon after. The runs of `motions` at
 the default level are more than half of that: read again and again, they took ten minutes."""
@@ -47,7 +47,7 @@ Save = Callable[[Mapping[str, Trajectory], Path], None]
 Ended = tuple[str, Path | None, Trajectory | None]
 """Why a run isn't whole, or empty; its file, if any; the run, if it has no file."""
 _BROKEN = ".failed.h5"
-_NAME = re.compile(r".+-([0-9a-f]{24})(\.failed)?\.h5")  # label, ID, and whether it broke down
+_NAME = re.compile(r".+-([0-9a-f]{24})(\.failed)?\.h5")  #: label, ID, and whether it broke down
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,12 @@ from weakref import WeakSet
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
 
-SOON = 3.0  # seconds after which whatever is at work says so
-OFTEN = 0.1  # seconds between two looks at whether it still is
-FORGOTTEN = 1.0  # seconds after which a worker that said it compiles no longer does
+SOON = 3.0  #: seconds after which whatever is at work says so
+OFTEN = 0.1  #: seconds between two looks at whether it still is
+FORGOTTEN = 1.0  #: seconds after which a worker that said it compiles no longer does
 KEPT = "compiling, up to a minute, once on this machine"
 NOT_KEPT = "compiling, each time: no place to keep it; NUMBA_CACHE_DIR can name one"
-workers: WeakSet[Connection] = WeakSet()  # the ends of pipes at which workers are heard
+workers: WeakSet[Connection] = WeakSet()  #: the ends of pipes at which workers are heard
 
 
 class _Heard:

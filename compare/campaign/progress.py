@@ -20,12 +20,12 @@ from compare.campaign.compiling import OFTEN, SOON
 from compare.campaign.workers import Spread
 from model.errors import few
 
-INTERVAL = 10.0  # seconds between plain lines
+INTERVAL = 10.0  #: seconds between plain lines
 READY = "getting ready"
-DRAWING = 0.1  # share of a validation's time that drawing its figures takes, about
+DRAWING = 0.1  #: share of a validation's time that drawing its figures takes, about
 BY_THE_TABLE = 60.0
 """Processor time, s, of which a validation's pace is taken to be that of the table of costs."""
-LATE = 0.1  # share of its cost that a protocol still takes, at least, however long it has taken
+LATE = 0.1  #: share of its cost that a protocol still takes, at least, however long it has taken
 Show = Callable[[str, int, int, int], None]
 """Called with what is being done, how much of it is done, of how much, and how much failed."""
 

@@ -13,7 +13,7 @@ from model import InputError, Parameters
 from model.arrays import Array
 from model.parameters import Range, check_names, check_number, parse_number
 
-MOST = 100_000  # most runs of a sweep
+MOST = 100_000  #: most runs of a sweep
 FIELDS = {field.name: field.metadata["unit"] for field in Parameters.quantities()}
 """Units of the parameters."""
 
@@ -24,8 +24,7 @@ class Axis:
 
     name: str
     values: tuple[float, ...]
-    between: bool = False
-    """Whether no more than the two ends were given."""
+    between: bool = False  #: whether no more than the two ends were given
 
     @classmethod
     def parse(cls, text: str, units: Mapping[str, str] = FIELDS, kind: str = "parameter") -> Axis:

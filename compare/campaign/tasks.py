@@ -30,18 +30,13 @@ mujoco.set_mju_user_warning(lambda text: None)
 class Task:
     """A run that stands for itself: two tasks with equal `key` give equal data, bit for bit."""
 
-    engine: str
-    """Name of a `compare.engines.study.Engine`."""
+    engine: str  #: name of a `compare.engines.study.Engine`
     parameters: Parameters
-    x0: npt.ArrayLike
-    """Initial state, 6 or 8 numbers; kept as a `State`."""
-    t_end: float  # s
-    flow: Flow | None = None
-    """omega_0 over time; None for a steady ``parameters.omega_0``."""
-    settings: Any = None
-    """Numerical settings of the engine; if None is given its defaults."""
-    sample_interval: float | None = None
-    """s; None for a thousandth of t_end."""
+    x0: npt.ArrayLike  #: initial state, 6 or 8 numbers; kept as a `State`
+    t_end: float  #: s
+    flow: Flow | None = None  #: omega_0 over time; None for a steady ``parameters.omega_0``
+    settings: Any = None  #: numerical settings of the engine; if None is given its defaults
+    sample_interval: float | None = None  #: s; None for a thousandth of t_end
 
     def __post_init__(self) -> None:
         if not isinstance(self.settings, self.simulator.settings | None):

@@ -31,21 +31,19 @@ Spread = Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[Any]]
 JUDGING = 30.0
 """Processor time that judging a claim or drawing a figure may take, s: thirty times what the
 longest takes at the quick level. What files say may be nonsense that takes years."""
-SCHEDULER_TIMEOUT = 10.0  # how long a scheduler has to answer, s
-ASLEEP = 1.0  # how long a thread that waits sleeps at a stretch, s
+SCHEDULER_TIMEOUT = 10.0  #: how long a scheduler has to answer, s
+ASLEEP = 1.0  #: how long a thread that waits sleeps at a stretch, s
 
 
 @dataclass(eq=False)
 class Workers:
     """An executor, started when needed, anew when its workers died; threads may share it."""
 
-    count: int
-    """Tasks at once."""
+    count: int  #: tasks at once
     start: Callable[[], Executor]
     stop: Callable[[Executor, bool], None]
     """Called with the executor and whether to give up what is under way."""
-    lost: tuple[type[BaseException], ...]
-    """Errors of a future that mean: the worker died."""
+    lost: tuple[type[BaseException], ...]  #: errors of a future that mean: the worker died
 
     def __post_init__(self) -> None:
         self._running: Executor | None = None

@@ -35,12 +35,10 @@ class Bracket:
     high: float
     runs: tuple[Trajectory | None, Trajectory | None] = (None, None)
     tasks: tuple[Task, ...] = ()
-    shift: float = 0.0
-    """How far the place moves with half the time step."""
+    shift: float = 0.0  #: how far the place moves with half the time step
     said: tuple[tuple[float, bool | None], ...] = ()
     """All that was asked so far: values and answers."""
-    failure: str = ""
-    """Why a run broke down, the last one if several did."""
+    failure: str = ""  #: why a run broke down, the last one if several did
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -67,8 +65,7 @@ class Search:
     task: Callable[[float, Bracket, Attempt], Task]
     """The run to ask at a value, given the bracket so far."""
     answer: Answer
-    width: float
-    """Width at which it is narrow enough."""
+    width: float  #: width at which it is narrow enough
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,10 +14,10 @@ from model.kinematics import VARIABLES
 class FluidConditions(TypedDict, total=False):
     """A ball that falls in a fluid."""
 
-    nu_f: Annotated[float, "m2 s-1"]  # kinematic viscosity
-    rho_f: Annotated[float, "kg m-3"]  # density of the fluid
-    rho_b: Annotated[float, "kg m-3"]  # density of the ball
-    r: Annotated[float, "m"]  # radius of the ball
+    nu_f: Annotated[float, "m2 s-1"]  #: kinematic viscosity
+    rho_f: Annotated[float, "kg m-3"]  #: density of the fluid
+    rho_b: Annotated[float, "kg m-3"]  #: density of the ball
+    r: Annotated[float, "m"]  #: radius of the ball
     gravity: Annotated[float, "m s-2"]
 
 
@@ -34,30 +34,30 @@ class Conditions(FluidConditions, total=False):
     h: float
     v_h: float
 
-    case: str  # name of the case, of a settled state or at the end of a motion
-    before: str  # name of the case on the level before
-    inner: str  # name of the case out of which a ball is pushed
-    outer: str  # name of the case into which
-    start: str  # how the ball starts
-    by: str  # how the number was found
-    side: str  # from which side of a threshold, or on the way up or down
-    figure: str  # the figure of the paper that is measured
+    case: str  #: name of the case, of a settled state or at the end of a motion
+    before: str  #: name of the case on the level before
+    inner: str  #: name of the case out of which a ball is pushed
+    outer: str  #: name of the case into which
+    start: str  #: how the ball starts
+    by: str  #: how the number was found
+    side: str  #: from which side of a threshold, or on the way up or down
+    figure: str  #: the figure of the paper that is measured
     event: str
-    slips: str  # whether a ball slips at one point or at both
-    contact: str  # A or B
-    law: str  # a law of contact, in words
-    of: str  # the variable that answers a push
-    pushed: str  # the variable that is pushed
-    level: float  # number of a level of the flow, from 1
-    mode: float  # number of a mode in order of frequency, from 1
+    slips: str  #: whether a ball slips at one point or at both
+    contact: str  #: A or B
+    law: str  #: a law of contact, in words
+    of: str  #: the variable that answers a push
+    pushed: str  #: the variable that is pushed
+    level: float  #: number of a level of the flow, from 1
+    mode: float  #: number of a mode in order of frequency, from 1
     restitution: float
     time: Annotated[float, "s"]
     duration: Annotated[float, "s"]
     period: Annotated[float, "s"]
-    f: Annotated[float, "Hz"]  # frequency of a pulsation
-    amplitude: Annotated[float, "rad s-1"]  # of a pulsation
-    rate: Annotated[float, "rad s-2"]  # at which the flow rises
-    slip: Annotated[float, "rad s-1"]  # size of a push
+    f: Annotated[float, "Hz"]  #: frequency of a pulsation
+    amplitude: Annotated[float, "rad s-1"]  #: of a pulsation
+    rate: Annotated[float, "rad s-2"]  #: at which the flow rises
+    slip: Annotated[float, "rad s-1"]  #: size of a push
     # direction of a push, a unit vector
     n_x: float
     n_y: float

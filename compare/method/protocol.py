@@ -43,8 +43,7 @@ class Protocol:
 
     name: str
     measure: Measure
-    needs: tuple[str, ...] = ()
-    """Protocols whose measurements it goes out from."""
+    needs: tuple[str, ...] = ()  #: protocols whose measurements it goes out from
     drawn: Callable[[Measurement], bool] = lambda m: False
     """Whether figures draw the runs of a measurement: all others are dropped."""
 
@@ -55,10 +54,8 @@ class Job:
 
     protocol: Protocol
     runner: Runner
-    results: Path
-    """The results directory."""
-    chosen: Mapping[str, Parameters] | None = None
-    """Sets in the place of the protocol's own."""
+    results: Path  #: the results directory
+    chosen: Mapping[str, Parameters] | None = None  #: sets in the place of the protocol's own
 
     @property
     def name(self) -> str:

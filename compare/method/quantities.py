@@ -45,7 +45,7 @@ from model import InputError, Parameters
 from model.errors import suggestion
 from model.kinematics import VARIABLES, state_units
 
-Scale = Callable[[Parameters], float]  # a natural size, by a parameter set
+Scale = Callable[[Parameters], float]  #: a natural size, by a parameter set
 
 
 @dataclass(frozen=True)
@@ -54,16 +54,13 @@ class Quantity:
 
     name: str
     symbol: str
-    unit: str  # SI
-    resolution: float
-    """Largest relative error of a prediction that a check may overlook."""
-    scale: Scale | None = None
-    """Its natural size; None where that is the predicted value."""
+    unit: str  #: SI
+    resolution: float  #: largest relative error of a prediction that a check may overlook
+    scale: Scale | None = None  #: its natural size; None where that is the predicted value
     of: str = ""
     """The variable, or force, of which it is the value, the rate of change, or the value at the
     end; empty for what no state has."""
-    threshold: bool = False
-    """Whether it is a flow at which stationary solutions begin or end."""
+    threshold: bool = False  #: whether it is a flow at which stationary solutions begin or end
 
     def size(self, p: Parameters, value: float = math.nan) -> float:
         """Natural size, by which its errors are divided: that of `scale`, or of a value."""
@@ -172,7 +169,7 @@ _ALL = (
     Quantity("jump_height", "height of the peak after a jump", "1", 1e-2),
     Quantity("ramp_end", "ω₀ at which a ramp has halved the lag", "rad s-1", 2e-2),
 )
-QUANTITIES: dict[str, Quantity] = {each.name: each for each in _ALL}  # every quantity by name
+QUANTITIES: dict[str, Quantity] = {each.name: each for each in _ALL}  #: every quantity by name
 
 
 def quantity(name: str) -> Quantity:

@@ -36,22 +36,16 @@ ANEW = "remove it, and 'dualball validate' measures anew"
 class Measurement:
     """One measured number, and all that it belongs to."""
 
-    protocol: str
-    """The name of the `compare.method.protocol.Protocol` that measured it."""
-    quantity: str
-    """A name of `compare.method.quantities`."""
+    protocol: str  #: the name of the `compare.method.protocol.Protocol` that measured it
+    quantity: str  #: a name of `compare.method.quantities`
     value: float
-    uncertainty: float
-    """Standard uncertainty, in the unit of the quantity."""
+    uncertainty: float  #: standard uncertainty, in the unit of the quantity
     budget: Mapping[str, float] = field(default_factory=dict)
     """What that is made up of: standard uncertainties by cause."""
     engine: str
-    set: str
-    """Name of the parameter set."""
-    parameters: Parameters
-    """With the omega_0 at which it was measured."""
-    at: Conditions = field(default_factory=Conditions)
-    """What else it depends on."""
+    set: str  #: name of the parameter set
+    parameters: Parameters  #: with the omega_0 at which it was measured
+    at: Conditions = field(default_factory=Conditions)  #: what else it depends on
     runs: tuple[str, ...] = ()
     """Keys of its runs; where they are kept, FILE/KEY, relative to the results directory."""
 
@@ -106,18 +100,14 @@ class Check:
     """A measured number beside its prediction."""
 
     measurement: Measurement
-    predicted: float
-    """nan where theory knows no such state."""
-    uncertainty: float
-    """Standard uncertainty of the deviation."""
+    predicted: float  #: nan where theory knows no such state
+    uncertainty: float  #: standard uncertainty of the deviation
     scale: float
     relation: Relation = Relation.EQUAL
-    coverage: float = COVERAGE
-    """Standard uncertainties in its tolerance."""
+    coverage: float = COVERAGE  #: standard uncertainties in its tolerance
     required: float | None = None
     """Its required resolution, where that isn't what its quantity says."""
-    criterion: int = 0
-    """Number of the criterion of its claim that chose it."""
+    criterion: int = 0  #: number of the criterion of its claim that chose it
 
     @property
     def deviation(self) -> float:
@@ -242,8 +232,8 @@ class Records:
         return Estimate(best.value, best.uncertainty) if best else None
 
 
-Sets = Mapping[str, Parameters]  # what a protocol measures, by name
-Measured = Iterator[Measurement | Missing]  # what it yields
+Sets = Mapping[str, Parameters]  #: what a protocol measures, by name
+Measured = Iterator[Measurement | Missing]  #: what it yields
 T = TypeVar("T")
 Found = Generator[Missing, None, T]
 """What a step of a protocol comes to, as in ``results = yield from carry_out(runner, pairs)``; what
@@ -287,15 +277,11 @@ class Origin:
     """Who measured what a file holds, and by which plan: elsewhere it is refused."""
 
     protocol: str
-    engine: str
-    """Of whose evidence it is a part."""
-    by: str
-    """Who measured: another engine where the protocol names one."""
-    step: int
-    """Time steps in one that a protocol asks for."""
+    engine: str  #: of whose evidence it is a part
+    by: str  #: who measured: another engine where the protocol names one
+    step: int  #: time steps in one that a protocol asks for
     level: str
-    plan: str
-    """Digest of engine, step, level, sets, and the sources that measure."""
+    plan: str  #: digest of engine, step, level, sets, and the sources that measure
     program: str = field(default_factory=lambda: current_versions()["dualball"])
 
 

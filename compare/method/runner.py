@@ -29,10 +29,8 @@ class Runner:
     campaign: Campaign
     engine: Engine
     level: Level
-    divisor: int = 1
-    """Time steps in one that a protocol asks for, see `Engine.divisors`."""
-    protocol: str = ""
-    """The name of the protocol that is carried out."""
+    divisor: int = 1  #: time steps in one that a protocol asks for, see `Engine.divisors`
+    protocol: str = ""  #: the name of the protocol that is carried out
 
     @property
     def sampling(self) -> Sampling:

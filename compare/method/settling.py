@@ -22,11 +22,11 @@ from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
 from model.drag import STOKES
 
-PRESSES = 0.05  # normal force, in weights, above which friction is looked at: less may hover
-SPIN = 1.0  # spin slip_y of a ball in a fluid at rest, in units of sqrt(g/R) R/r
+PRESSES = 0.05  #: normal force, in weights, above which friction is looked at: less may hover
+SPIN = 1.0  #: spin slip_y of a ball in a fluid at rest, in units of sqrt(g/R) R/r
 SPAN = 40.0
 """Least length of a round in units of 1/c, the time in which the fluid stops a free ball."""
-LONGEST = 2.0  # length of the longest round in units of `SPAN`
+LONGEST = 2.0  #: length of the longest round in units of `SPAN`
 SHORT = (1 / 64, 1 / 8)
 """Rounds before those where the law isn't Stokes': other drag laws are stronger, so balls settle
 sooner. The drift limit of such a round is reduced in proportion to its length."""
@@ -62,10 +62,8 @@ class SteadyState:
     mean: Array
     """Its mean state, (8,), from which it goes on: without the oscillation that it still has."""
     task: Task = field(repr=False)
-    excess: float = math.inf
-    """Drift or swing divided by its limit for a comparison with theory."""
-    failure: str = ""
-    """Why it doesn't count as settled."""
+    excess: float = math.inf  #: drift or swing divided by its limit for a comparison with theory
+    failure: str = ""  #: why it doesn't count as settled
 
     def settled_in(self, *cases: Case) -> bool:
         """Whether it counts as settled, in one of these cases."""
@@ -76,10 +74,8 @@ class SteadyState:
 class SettlingCriteria:
     """For how long a state is waited for, and how well it must be settled."""
 
-    divisor: float = 1
-    """Time steps in one of `coarse_step`."""
-    span: float = SPAN
-    """Length of a round in units of 1/c."""
+    divisor: float = 1  #: time steps in one of `coarse_step`
+    span: float = SPAN  #: length of a round in units of 1/c
     loose: float = 1.0
     """A settled state may drift and swing up to so many times the limit for a comparison."""
     sharp: float = math.inf

@@ -17,8 +17,8 @@ from numpy.polynomial import Polynomial
 from model import Case, Trajectory
 from model.arrays import Array
 
-COVERAGE = 3.0  # standard uncertainties in the tolerance of one number, see `coverage`
-TAPER = 8  # exponent of the window's sine: m periods leave about (TAPER/2)!^2/(pi m^(TAPER+1))
+COVERAGE = 3.0  #: standard uncertainties in the tolerance of one number, see `coverage`
+TAPER = 8  #: exponent of the window's sine: m periods leave about (TAPER/2)!^2/(pi m^(TAPER+1))
 
 
 @dataclass(frozen=True)
@@ -161,7 +161,7 @@ def hops_on(y: Array, R: float) -> bool:
     return bool(y[near[0] : near[-1] + 1].max() > highest / 2)
 
 
-POINTS = 5  # least number of points that extrapolations begin with
+POINTS = 5  #: least number of points that extrapolations begin with
 LEAST_RATIO, LARGEST_RATIO = 0.2, 0.9
 """Range of the ratio of the geometric series by which the changes of an estimate, point by point,
 are continued: two changes may be small by chance, and with a ratio near 1 the sum has no bound."""

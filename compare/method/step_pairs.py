@@ -36,20 +36,15 @@ class Start:
 class StepPair(Start):
     """A motion that is run with two time steps, or three; or with one, for no error."""
 
-    t_end: float  # s
-    divisors: tuple[int, ...]
-    """Time steps in one of `coarse_step`, the fewest first."""
-    samples: int | None = None
-    """None for every step."""
-    read: Callable[..., Any] = lambda run: run
-    """What is read from the runs with one time step."""
+    t_end: float  #: s
+    divisors: tuple[int, ...]  #: time steps in one of `coarse_step`, the fewest first
+    samples: int | None = None  #: None for every step
+    read: Callable[..., Any] = lambda run: run  #: what is read from the runs with one time step
     flow: Flow | None = None
     together: tuple[StepPair, ...] = ()
     """Motions in the place of this one that are read together: other parameters, starts, flows."""
-    at: Conditions = field(default_factory=Conditions)
-    """Of all measurements of this pair."""
-    rows: int = 1
-    """Measurements that are left out if a run breaks down."""
+    at: Conditions = field(default_factory=Conditions)  #: of all measurements of this pair
+    rows: int = 1  #: measurements that are left out if a run breaks down
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,10 +53,8 @@ class StepPairResult:
 
     runner: Runner
     pair: StepPair
-    tasks: Sequence[Task] = field(repr=False)
-    """The runs, those with the coarsest step first."""
-    reads: Sequence[Any]
-    """One for each step, the coarsest first."""
+    tasks: Sequence[Task] = field(repr=False)  #: the runs, those with the coarsest step first
+    reads: Sequence[Any]  #: one for each step, the coarsest first
 
     @property
     def coarse(self) -> Any:

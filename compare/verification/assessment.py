@@ -23,8 +23,8 @@ from compare.verification import judge
 from compare.verification.claim import Claim, EngineVerdict, Outcome, Verdict
 from compare.verification.convergence import Ends, series_by_step, zero_step_limit
 
-USUAL_STEP = 2e-3  # MuJoCo's own time step, s, at which users meet its deviations
-SEVERAL = 3  # most reasons that are told
+USUAL_STEP = 2e-3  #: MuJoCo's own time step, s, at which users meet its deviations
+SEVERAL = 3  #: most reasons that are told
 
 
 def full_verdict(claim: Claim, evidence: RecordsByEngine) -> Verdict:

@@ -32,21 +32,17 @@ class Outcome(StrEnum):
 
     CONFIRMED = "confirmed"
     REFUTED = "refuted"
-    INCONCLUSIVE = "inconclusive"
-    """What was measured is too coarse to tell."""
+    INCONCLUSIVE = "inconclusive"  #: what was measured is too coarse to tell
     NOT_RUN = "not run"
-    ERROR = "error"
-    """The prediction broke down."""
-    NOT_ASKED = "not asked"
-    """Of another engine than the one on trial."""
+    ERROR = "error"  #: the prediction broke down
+    NOT_ASKED = "not asked"  #: of another engine than the one on trial
 
 
 class Text(StrEnum):
     """How the statement relates to the paper's text."""
 
     PRINTED = "as printed"
-    CORRECTED = "corrected"
-    """True once a listed erratum is corrected."""
+    CORRECTED = "corrected"  #: true once a listed erratum is corrected
 
 
 def given(**conditions: Unpack[Conditions]) -> When:
@@ -65,15 +61,13 @@ class Criterion:
 
     protocol: str
     quantity: str
-    predict: Predict
-    """Raises one of `judge.UNKNOWN` where theory knows no such state."""
+    predict: Predict  #: raises one of `judge.UNKNOWN` where theory knows no such state
     _: KW_ONLY
     when: When = lambda m: True
     size: Callable[[Measurement], float] | None = None
     """By what errors are divided, where that isn't the natural size of the quantity."""
     relation: Relation = Relation.EQUAL
-    by: str = ""
-    """The function or equation that predicts, for the reader."""
+    by: str = ""  #: the function or equation that predicts, for the reader
 
     def __post_init__(self) -> None:
         quantity(self.quantity)
@@ -84,21 +78,16 @@ class Claim:
     """One checkable statement."""
 
     id: str
-    source: str
-    """Proposition, equation, figure or table."""
+    source: str  #: proposition, equation, figure or table
     statement: str
     criteria: tuple[Criterion, ...]
     _: KW_ONLY
     text: Text = Text.PRINTED
-    reason: str = ""
-    """What had to be corrected, or why a refutation is expected."""
+    reason: str = ""  #: what had to be corrected, or why a refutation is expected
     expected: Outcome = Outcome.CONFIRMED
-    level: Level = Level.QUICK
-    """The least level at which it is measured."""
-    section: str = ""
-    """Section of the report, set by the `catalogue`."""
-    place: str = ""
-    """FILE:LINE where it is written."""
+    level: Level = Level.QUICK  #: the least level at which it is measured
+    section: str = ""  #: section of the report, set by the `catalogue`
+    place: str = ""  #: FILE:LINE where it is written
 
     def __post_init__(self) -> None:
         if not self.criteria:
@@ -144,8 +133,7 @@ class Judged:
 
     outcome: Outcome
     checks: tuple[Check, ...] = ()
-    missing: tuple[Missing, ...] = ()
-    """What its protocols left out, and why."""
+    missing: tuple[Missing, ...] = ()  #: what its protocols left out, and why
 
     @property
     def worst(self) -> float:
@@ -170,15 +158,13 @@ class EngineVerdict(Judged):
     """What one engine says of a claim: by checks in the zero-step limit, where it is judged so."""
 
     engine: str
-    reason: str = ""
-    """Why it was not asked, or leaves the claim inconclusive."""
+    reason: str = ""  #: why it was not asked, or leaves the claim inconclusive
     order: float = math.nan
     """Median of the orders with which the numbers converge; nan where the step shows nothing."""
     deviations: tuple[float, ...] = ()
     """Sizes of deviations, divided by their scales, of numbers that are sure enough to tell them:
     at MuJoCo's own step of 2 ms, or of an engine that is judged at one step at that."""
-    left_out: int = 0
-    """Measurements that they left out, or that have no limit."""
+    left_out: int = 0  #: measurements that they left out, or that have no limit
 
     @property
     def typical(self) -> float:
@@ -196,10 +182,8 @@ class Verdict(Judged):
     """What the numbers of the engine on trial say of a claim."""
 
     claim: Claim
-    error: str = ""
-    """Why it could not be judged."""
-    engines: tuple[EngineVerdict, ...] = ()
-    """What every engine says, the one on trial first."""
+    error: str = ""  #: why it could not be judged
+    engines: tuple[EngineVerdict, ...] = ()  #: what every engine says, the one on trial first
 
     @property
     def passed(self) -> bool:

@@ -39,7 +39,7 @@ LOOSER, COARSEST = 300.0, 2e-2
 """A check in the limit may overlook so many times as much as one of the engine on trial, but no
 more than 2 %, unless that may, too. (Raised from 100 after a first measurement, when uncertainties
 were made three times as large.)"""
-NEAR = 0.1  # largest difference of the conditions of one thing at different steps, by their size
+NEAR = 0.1  #: largest difference of the conditions of one thing at different steps, by their size
 MARGIN = 0.03
 """Relative distance from a threshold below which no limit is taken of a settled state: with a step
 of a millisecond thresholds lie up to so far off, and so the step decides on the case. (Chosen after
@@ -56,8 +56,8 @@ floor, a deviation may fall as the root of the step. (Chosen after that had been
 threshold of 115.)"""
 ORDERS = 0.2, 2.5
 """Between which an order is looked for: others show where terms of several orders cancel."""
-LEAST_STEPS = 3  # time steps with which a number must have been measured to have a limit
-Ends = Set[tuple[str, float]]  # measured thresholds, each with the name of its set
+LEAST_STEPS = 3  #: time steps with which a number must have been measured to have a limit
+Ends = Set[tuple[str, float]]  #: measured thresholds, each with the name of its set
 Alike = tuple[str, int, str, tuple[tuple[str, str], ...]]
 """What checks of one thing share: protocol, criterion, set, and conditions that are no numbers."""
 Limit = tuple[Check, float]
@@ -68,8 +68,7 @@ Limit = tuple[Check, float]
 class StepSeries:
     """The same check with several time steps, the coarsest first."""
 
-    divisors: tuple[int, ...]
-    """Time steps in one that the protocol asks for, (n,)."""
+    divisors: tuple[int, ...]  #: time steps in one that the protocol asks for, (n,)
     checks: tuple[Check, ...]
 
     @property

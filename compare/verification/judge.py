@@ -27,7 +27,7 @@ more they are less sure than what is measured."""
 UNKNOWN = (LookupError, InputError, NoOrbitError, SimulationError)
 """What a prediction raises without such a state: a deviation, not a breakdown."""
 
-ENOUGH = 2 / 3  # part of the numbers of each criterion that must be able to tell
+ENOUGH = 2 / 3  #: part of the numbers of each criterion that must be able to tell
 SILENT = "its protocol measured less than is planned, and does not say why"
 
 _computed = functools.cache(lambda function, *args, **options: function(*args, **options))
