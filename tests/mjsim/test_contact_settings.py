@@ -2,6 +2,7 @@
 
 import contextlib
 import dataclasses
+import itertools
 
 import numpy as np
 import pytest
@@ -28,29 +29,20 @@ def test_for_problem_keeps_slipping_continuous(timestep, name) -> None:
 
 
 def test_contacts_die_out_for_all_friction_up_to_one() -> None:
-    fast = ContactSettings.at(2e-3)
-    for mu in np.linspace(0, 3, 13):
-        for eta in np.linspace(0, 3, 13):
-            assert (
-                fast.suited(Parameters.named("reference").replace(mu=mu, eta=eta)).contact_decay(
-                    mu, eta
-                )
-                < 1
-            )
+    fast, p = ContactSettings.at(2e-3), Parameters.named("reference")
+    for mu, eta in itertools.product(np.linspace(0, 3, 13), repeat=2):
+        assert fast.suited(p.replace(mu=mu, eta=eta)).contact_decay(mu, eta) < 1
 
 
 @pytest.mark.parametrize(
     ("solref", "holds"), [((3, 0.75), True), ((2, 1.0), True), ((2, 0.5), False)]
 )
 def test_decay_tells_which_contacts_hold_a_slipping_ball(solref, holds) -> None:
-    p = Parameters(
-        m=0.016, r=0.0221, R=0.0613, j=0.657, mu=0.92, eta=0.4, g=7.9, c=0.907, omega_0=15.9
-    )
+    made = {"m": 0.016, "r": 0.0221, "R": 0.0613, "j": 0.657, "mu": 0.92, "eta": 0.4}
+    p, step = Parameters(**made, g=7.9, c=0.907, omega_0=15.9), 2e-3
     (steady,) = (each for each in analytic.stationary_solutions(p) if each.case is Case.SS)
-    step = 2e-3
-    settings = ContactSettings.for_problem(
-        p, step, p.R * p.omega_0, solref=(solref[0] * step, solref[1])
-    )
+    stiff = solref[0] * step, solref[1]
+    settings = ContactSettings.for_problem(p, step, p.R * p.omega_0, solref=stiff)
     assert (settings.contact_decay(p.mu, p.eta) < 1) == holds
     with contextlib.nullcontext() if holds else pytest.warns(UserWarning, match="chatters"):
         run = mjsim.simulate(p, steady.x, 0.4, settings=settings, sample_interval=step)
@@ -65,9 +57,8 @@ STEP = 1e-3
 
 def damped(solimp, damping=0.5, step=STEP, **more):
     """Settings with the given impedance and friction damping b_f h."""
-    return ContactSettings.at(
-        step, solimp=solimp, solreffriction=2 * step / (solimp * damping), **more
-    )
+    soft = 2 * step / (solimp * damping)
+    return ContactSettings.at(step, solimp=solimp, solreffriction=soft, **more)
 
 
 def slipping(settings):

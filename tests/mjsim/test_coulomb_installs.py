@@ -45,7 +45,7 @@ STRUCTS = "import mujoco.introspect.structs as s; d = s.STRUCTS['mjData']; d.fie
     [
         (
             STRUCTS.format("[f for f in d.fields if f.name != 'time']"),
-            f"{NAME}.* which has no time",
+            f"{NAME}.* has no time",
         ),
         (STRUCTS.format("d.fields[::-1]"), f"{NAME}.* doesn't lie in memory"),
         (STRUCTS.format("d.fields[1:]"), f"{NAME}.* doesn't lie in memory"),

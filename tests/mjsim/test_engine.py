@@ -51,9 +51,8 @@ SOFT = ContactSettings()
 def test_a_run_begins_at_the_azimuth_that_is_asked_for(settings) -> None:
     """Later ones are second order in the step: places are brought back by the velocity of the
     sample."""
-    run = mjsim.simulate(
-        P.replace(omega_0=25.0), [0, 0, 12.0, -2, 1, 6], 0.01, settings=settings, theta_0=0.3
-    )
+    p, x0 = P.replace(omega_0=25.0), [0, 0, 12.0, -2, 1, 6]
+    run = mjsim.simulate(p, x0, 0.01, settings=settings, theta_0=0.3)
     assert run.theta[0] == pytest.approx(0.3, abs=1e-11)
 
 
@@ -62,12 +61,8 @@ def test_results_are_the_same_to_the_bit_on_any_number_of_threads(settings) -> N
     """Also of a run that breaks down, beside others; progress is that of all of them."""
     sets = [P.replace(omega_0=omega_0) for omega_0 in (5.0, 12.0, 25.0, 40.0, 60.0)]
     x0s, told = [[0.0, 0, 10.0, 0, 0, 0]] * 4 + [[1e11, 0, 0, 0, 0, 0]], []
-    one, *others = (
-        mjsim.simulate_many(
-            sets, x0s, 0.1, settings=settings, sample_interval=0.01, threads=n, progress=told.append
-        )
-        for n in (1, 2, 3, 1000)
-    )
+    how = {"settings": settings, "sample_interval": 0.01, "progress": told.append}
+    one, *others = (mjsim.simulate_many(sets, x0s, 0.1, threads=n, **how) for n in (1, 2, 3, 1000))
     assert min(told) < told[-1] == max(told) == 1.0
     assert not one[-1].complete
     assert one[0].complete
@@ -105,14 +100,10 @@ def test_a_ball_that_passes_the_axis_goes_on(miss) -> None:
     p = P.replace(omega_0=0.0, c=0.0, mu=0.0, eta=0.0)
     a, v = 0.8 * p.R, 0.2
     rho = math.hypot(a, miss)
-    x0, still = (
-        [0, 0, v * miss / rho**2, 0, 0, 0, p.R - rho, v * a / rho],
-        [0, 0, 0, 0, 0, 0, 0.2 * p.R, 0],
-    )
-    together = mjsim.simulate_many(
-        [p, p], [x0, still], 0.35, settings=RigidContacts(), sample_interval=0.01
-    )
-    alone = mjsim.simulate(p, x0, 0.35, settings=RigidContacts(), sample_interval=0.01)
+    x0 = [0, 0, v * miss / rho**2, 0, 0, 0, p.R - rho, v * a / rho]
+    still, how = [0, 0, 0, 0, 0, 0, 0.2 * p.R, 0], {"sample_interval": 0.01}
+    together = mjsim.simulate_many([p, p], [x0, still], 0.35, settings=RigidContacts(), **how)
+    alone = mjsim.simulate(p, x0, 0.35, settings=RigidContacts(), **how)
     for run in (alone, together[0]):
         exact = np.hypot(miss, a - v * run.time)
         np.testing.assert_allclose(p.R - run.h, exact, rtol=0, atol=1 / 6 / 32**2 * p.R)
@@ -132,17 +123,13 @@ def test_a_ball_that_comes_to_the_axis_ends_its_run(omega_c) -> None:
 def test_a_ball_that_slides_down_the_wall_as_fast_as_drag_lets_it_stays_on_it(step) -> None:
     """Its load on the wall is a fifth of the weight, its slip 10 m/s; it falls as drag says."""
     p = P.replace(m=0.02, r=0.004, R=0.03, j=0.35, mu=0.15, eta=0.7, g=9.1, c=0.8, omega_0=7.489)
-    run = mjsim.simulate(
-        p, [100.0, -9.7, 7.489, 0, 0, 0], 2.0, settings=RigidContacts(timestep=step)
-    )
+    x0 = [100.0, -9.7, 7.489, 0, 0, 0]
+    run = mjsim.simulate(p, x0, 2.0, settings=RigidContacts(timestep=step))
     assert set(run.cases[len(run.time) // 2 :]) == {Case.NS}
     # Friction of the wall, eta R omega_c^2 upwards, slows it: less than the weight, which drag
     # balances in the end.
-    assert (
-        -p.g / p.c
-        < run.v_y[-1]
-        < -(p.g - p.eta * p.R * p.omega_0**2) / p.c * (1 - math.exp(-p.c * 2.0))
-    )
+    slowed = -(p.g - p.eta * p.R * p.omega_0**2) / p.c
+    assert -p.g / p.c < run.v_y[-1] < slowed * (1 - math.exp(-p.c * 2.0))
 
 
 def test_how_a_ball_slides_round_on_its_pole_does_not_depend_on_the_step() -> None:
