@@ -59,10 +59,8 @@ def test_functions_have_no_more_lines_and_parameters_than_a_reader_keeps_in_mind
             lines = node.end_lineno - node.lineno + 1
             if ast.get_docstring(node):
                 lines -= node.body[0].end_lineno - node.body[0].lineno + 1
-            names = {
-                each.arg
-                for each in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)
-            }
+            given = node.args
+            names = {each.arg for each in given.posonlyargs + given.args + given.kwonlyargs}
             if lines > LINES or len(names - {"self", "cls"}) > PARAMETERS:
                 large.add(f"{path.as_posix()}:{node.name}")
     assert large == EXCEPTIONS

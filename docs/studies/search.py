@@ -141,8 +141,7 @@ def confirm(p: Parameters, x: npt.ArrayLike) -> Hopping | None:
     if not any(_lands(seen)):
         return None
     limit = periodic_limit(seen)
-    if limit and limit.orbit and (count := sum(landings(limit.orbit.changes))):
-        orbit = limit.orbit
+    if limit and (orbit := limit.orbit) and (count := sum(landings(orbit.changes))):
         return Hopping(
             landings=int(count),
             period=orbit.period / unit,

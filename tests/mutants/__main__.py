@@ -20,28 +20,19 @@ def main() -> int:
         "the quickest first"
     )
     parser.add_argument("directories", type=Path, nargs="+", metavar="DIR", help=results)
-    parser.add_argument(
-        "--engines", action="store_true", help="also measure with every wrong engine"
-    )
     one = (
         "also judge by what this engine alone says, as mujoco-plain, stored in DIR or the first "
         "of all; repeatable"
     )
-    parser.add_argument("--alone", action="append", default=[], metavar="NAME[=DIR]", help=one)
-    parser.add_argument(
-        "--whole",
-        action="store_true",
-        help="judge by all claims on the first of them: takes longer",
-    )
-    parser.add_argument(
-        "--page", type=Path, metavar="FILE", help="page to write, and the list beside it"
-    )
-    parser.add_argument(
-        "--workers", type=int, default=os.cpu_count() or 1, metavar="N", help="processes"
-    )
-    parser.add_argument(
-        "--least", type=float, default=1.0, metavar="SHARE", help="to be noticed (default 1: all)"
-    )
+    add, cores = parser.add_argument, os.cpu_count() or 1
+    add("--engines", action="store_true", help="also measure with every wrong engine")
+    add("--alone", action="append", default=[], metavar="NAME[=DIR]", help=one)
+    whole = "judge by all claims on the first of them: takes longer"
+    add("--whole", action="store_true", help=whole)
+    add("--page", type=Path, metavar="FILE", help="page to write, and the list beside it")
+    add("--workers", type=int, default=cores, metavar="N", help="processes")
+    noticed = "to be noticed (default 1: all)"
+    add("--least", type=float, default=1.0, metavar="SHARE", help=noticed)
     args = parser.parse_args()
     try:
         first, *others = args.directories
