@@ -176,55 +176,70 @@ def measure(runner: Runner, sets: Sets, records: Records) -> Measured:
 
 def _of_set(runner: Runner, name: str, p: Parameters, records: Records) -> Procedure[None]:
     """The thresholds of a set."""
-    sampling, each = runner.sampling, Findings(runner, name, p)
-    sure, width = not sampling.granted, sampling.thresholds_width
-    cases, changes = _where_cases_change(runner, name, records)
-    # The largest flow at which a ball that rolls at both points goes on so.
-    if rolling := changes.get(RR_ENDS):
-        yield from each.narrow(sure, each.search(RR_ENDS, rolling, width * rolling.high))
-    end = each.brackets.get(RR_ENDS)
-    # Roughly, up to where the wall holds no ball, and SS settles on the floor.
-    rough = []
-    if sinking := changes.get(NS_ENDS):
-        rough.append(each.search(NS_ENDS, sinking, COARSE * sinking.low))
-    slipping = changes.get(SS_ENDS)
-    if slipping and end and not lifts(end) and end.high < slipping.high:
-        slipping = replace(slipping, low=max(slipping.low, end.high))
-        rough.append(each.search(SS_ENDS, slipping, COARSE * slipping.low))
-    yield from each.narrow(False, *rough)
-    # A bracket counts only if something was seen beyond it, or that is granted.
-    for kind, bracket in [*each.brackets.items()]:
-        if not (bracket.runs[1] or bracket.high in cases[kind] or sampling.granted):
-            del each.brackets[kind]
+    each = Findings(runner, name, p, *_where_cases_change(runner, name, records))
+    yield from _end_of_rolling(each)
+    yield from _sinking_and_slipping(each)
     yield from _settle_beside(each)
-    # Where slip begins on the wall, and where a ball that is pressed on the floor, with a bit less
-    # spin, rolls again: from settled states continued.
-    begun = []
-    begins, carried = each.brackets.get(NS_ENDS), each.states.get("NR", [])
-    if begins and len(carried) == len(DISTANCES_OF_NR):
-        start = continued(carried, height=settling.safe_height(p))
-        begun.append(each.search(NR_BEGINS, begins, width * begins.high, start))
-    end, lifted = each.brackets.get(RR_ENDS), each.states.get("lifted", [])
-    if end and len(lifted) == len(DISTANCES_OF_NR):
-        change = Bracket(end.low * (1 - COARSE), end.high * (1 + COARSE))
-        pressed = continued(lifted, height=0.0, less=1e-3)
-        begun.append(each.search(RR_RETURNS, change, width * end.high, pressed))
-    yield from each.narrow(sure, *begun)
-    # The largest flow at which a ball on the floor settles. At a fold all slows down, like the root
-    # of the distance.
+    yield from _on_the_wall_and_back(each)
     top, smooth = _end_of_slipping(each)
-    if top and sampling.slow:
-        narrowest, nearest = sampling.thresholds_fold, each.states["last SS"][0].mean
-        change = around(top.value, max(narrowest, 5.0 * top.uncertainty / top.value))
-        time = 1 / math.sqrt(narrowest)
-        fold = each.search(FOLD, change, narrowest * top.value, lambda _: nearest, time)
-        yield from each.narrow(False, fold)
+    if top and runner.sampling.slow:
+        yield from _fold(each, top)
     for kind, bracket in each.brackets.items():
         if bracket.failure and kind is not NS_ENDS:  # which is looked for roughly
             why = f"{kind.name}: its flow is known less well, as a run {bracket.failure}"
             yield each.missing(why, 0)
     yield from _rows(each)
-    yield from _rows_of_slipping(each, cases[SS_ENDS], top, smooth)
+    yield from _rows_of_slipping(each, top, smooth)
+
+
+def _end_of_rolling(each: Findings) -> Procedure[None]:
+    """The largest flow at which a ball that rolls at both points goes on so."""
+    if change := each.changes.get(RR_ENDS):
+        width = each.runner.sampling.thresholds_width * change.high
+        yield from each.narrow(each.sure, each.search(RR_ENDS, change, width))
+
+
+def _sinking_and_slipping(each: Findings) -> Procedure[None]:
+    """Roughly, up to where the wall holds no ball, and SS settles on the floor.
+
+    A bracket counts only if something was seen beyond it, or that is granted."""
+    searches = []
+    if change := each.changes.get(NS_ENDS):
+        searches.append(each.search(NS_ENDS, change, COARSE * change.low))
+    change, end = each.changes.get(SS_ENDS), each.brackets.get(RR_ENDS)
+    if change and end and not lifts(end) and end.high < change.high:
+        change = replace(change, low=max(change.low, end.high))
+        searches.append(each.search(SS_ENDS, change, COARSE * change.low))
+    yield from each.narrow(False, *searches)
+    for kind, bracket in [*each.brackets.items()]:
+        if each.sure and not (bracket.runs[1] or bracket.high in each.cases[kind]):
+            del each.brackets[kind]
+
+
+def _on_the_wall_and_back(each: Findings) -> Procedure[None]:
+    """Where slip begins on the wall, and where a ball that is pressed on the floor, with a bit less
+    spin, rolls again: from settled states continued."""
+    searches, width = [], each.runner.sampling.thresholds_width
+    begins, carried = each.brackets.get(NS_ENDS), each.states.get("NR", [])
+    if begins and len(carried) == len(DISTANCES_OF_NR):
+        start = continued(carried, height=settling.safe_height(each.p))
+        searches.append(each.search(NR_BEGINS, begins, width * begins.high, start))
+    end, lifted = each.brackets.get(RR_ENDS), each.states.get("lifted", [])
+    if end and len(lifted) == len(DISTANCES_OF_NR):
+        change = Bracket(end.low * (1 - COARSE), end.high * (1 + COARSE))
+        pressed = continued(lifted, height=0.0, less=1e-3)
+        searches.append(each.search(RR_RETURNS, change, width * end.high, pressed))
+    yield from each.narrow(each.sure, *searches)
+
+
+def _fold(each: Findings, top: Estimate) -> Procedure[None]:
+    """The largest flow at which a ball on the floor settles, at the fold.
+
+    There all slows down, like the root of the distance."""
+    narrowest, nearest = each.runner.sampling.thresholds_fold, each.states["last SS"][0].mean
+    change = around(top.value, max(narrowest, 5.0 * top.uncertainty / top.value))
+    time, width = 1 / math.sqrt(narrowest), narrowest * top.value
+    yield from each.narrow(False, each.search(FOLD, change, width, lambda _: nearest, time))
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,9 +249,18 @@ class Findings:
     runner: Runner
     set: str
     p: Parameters
+    cases: Mapping[Passage, Mapping[float, Case]]
+    """In which cases balls that start so were seen to settle, by flow, the slowest first."""
+    changes: Mapping[Passage, Bracket]
+    """Flows between which a passage is looked for."""
     brackets: dict[Passage, Bracket] = field(default_factory=dict)
     states: dict[str, list[SteadyState]] = field(default_factory=dict)
     """Settled states beside a limit, the nearest first, by which: see `_settle_beside`."""
+
+    @property
+    def sure(self) -> bool:
+        """Whether what is beyond a bracket must be seen: not where it is granted."""
+        return not self.runner.sampling.granted
 
     def narrow(self, careful: bool, *searches: tuple[Passage, Search]) -> Procedure[None]:
         """Narrow down what is searched for."""
@@ -442,9 +466,7 @@ def _rows(each: Findings) -> Measured:
     yield from each.rows_of_zero("NS", "v_y", "omega_02", "from below", by)
 
 
-def _rows_of_slipping(
-    each: Findings, from_rest: Mapping[float, Case], top: Estimate | None, smooth: bool
-) -> Measured:
+def _rows_of_slipping(each: Findings, top: Estimate | None, smooth: bool) -> Measured:
     """Rows of the end of slipping, at a fold or at omega_02, and the number of folds."""
     if "last SS" not in each.states:
         if (rolling := each.bracket_seen(RR_ENDS)) and not lifts(rolling):
@@ -452,13 +474,15 @@ def _rows_of_slipping(
         return
     tasks = [state.task for state in each.states["last SS"]]
     # At how many of the rising flows that were tried a ball from rest ceases to settle in SS.
-    said: dict[float, bool | None] = {flow: case is Case.SS for flow, case in from_rest.items()}
+    said: dict[float, bool | None] = {
+        flow: case is Case.SS for flow, case in each.cases[SS_ENDS].items()
+    }
     if tried := each.brackets.get(SS_ENDS):  # between its ends a ball settles too slowly
         said |= {flow: answer for flow, answer in tried.said if flow in tried.ends}
     ends = sum(bool(said[slow]) and said[fast] is False for slow, fast in pairwise(sorted(said)))
     # Beside known flows only a ball may have settled at none beyond the last.
     told = len(tasks) >= POINTS and (smooth or top is not None)
-    if told and (ends or not each.runner.sampling.granted):
+    if told and (ends or each.sure):
         yield each.row("folds", float(ends - smooth), tasks)
     if smooth:
         by = "floor force of settled slipping"
