@@ -515,8 +515,7 @@ def lift(runner: Runner, sets: Sets, records: Records) -> Measured:
 
 def _lift(arrow: Arrow) -> Procedure[None]:
     """omega_c at which the ball leaves the floor along an arrow."""
-    runner, unit = arrow.runner, time_unit(arrow.p)
-    tasks = [arrow.task(Omega / unit) for Omega in FIRST_ORBITS]
+    tasks = [arrow.task(Omega / time_unit(arrow.p)) for Omega in FIRST_ORBITS]
     (got,) = yield from asked(tasks)
     runs = [] if isinstance(got, str) else arrow.staying(got)
     if not runs:
@@ -524,50 +523,71 @@ def _lift(arrow: Arrow) -> Procedure[None]:
         yield arrow.missing(f"the run {got}" if isinstance(got, str) else strays)
         return
     orbits, forces = [float(run.omega_c[0]) for run in runs], [_force(run) for run in runs]
-    halves = runner.sampling.halves
     if None not in forces:
-        fastest = orbits[-1]
-        yield arrow.row("lifts", fastest, 0.0, tasks)
+        yield arrow.row("lifts", orbits[-1], 0.0, tasks)
         if arrow.inner is not Case.RR:  # whose floor and wall share the load in any way
-            later = [arrow.task(fastest, times) for times in halves]
-            (near,) = yield from asked(later)
-            load = None if isinstance(near, str) else _load(runner, near)
-            row = arrow.row("moving_force_Ay", fastest, load or math.nan, later)
-            yield if_found(row, f"the force of the floor in {arrow.inner.name} is none")
+            yield from _load(arrow, orbits[-1])
         return
     off = forces.index(None)
     if (leaves := Case(int(runs[off].case[-1]))) is not arrow.outer:
         yield arrow.missing(f"a ball that leaves the floor ends in {leaves.name}")
     elif arrow.inner is Case.RR and off:
-        width = runner.sampling.thresholds_width * orbits[off]
-        around = Bracket(orbits[off - 1], orbits[off])
-
-        def task(omega_c: float, bracket: Bracket, attempt: Attempt) -> Task:
-            return arrow.task(omega_c, attempt.divisor)
-
-        search = Search(around, task, lambda run: _force(run) is not None, width)
-        (bracket,) = yield from narrowed(search, careful=not runner.sampling.granted)
-        last, _ = bracket.runs
-        if bracket.failure or not last or not arrow.staying([last]):
-            slips = "the ball slips before it leaves the floor"
-            yield arrow.missing(f"the run {bracket.failure}" if bracket.failure else slips)
-        else:
-            yield arrow.row("lift_onset", 1 / unit, bracket.place, bracket.tasks)
+        yield from _bracketed_onset(arrow, Bracket(orbits[off - 1], orbits[off]))
     else:
-        # just below the orbit at which it lifts off by a line through the last two forces
-        pressed = [(w**2, force.value) for w, force in zip(orbits, forces, strict=True) if force]
-        where = 0.0
-        if len(pressed) >= 2 and arrow.inner is not Case.RR:
-            (a, high), (b, low) = pressed[-2:]
-            where = math.sqrt(b + low * (b - a) / (high - low)) if high > low else 0.0
-        nearer = [where * (1 - part) for part in LATER_ORBITS if where]
-        later = [arrow.task(orbit, times) for orbit in nearer for times in halves]
-        (near,) = yield from asked(later)
-        if isinstance(near, str) or (onset := _onset(near)) is None:
-            chatters = "the contact at the floor opens and closes"
-            yield arrow.missing(f"the run {near}" if isinstance(near, str) else chatters)
-        else:
-            yield arrow.row("lift_onset", 1 / unit, onset, later)
+        yield from _extrapolated_onset(arrow, orbits, forces)
+
+
+def _load(arrow: Arrow, orbit: float) -> Procedure[None]:
+    """Force of the floor at an orbit at which it presses, N, from both steps."""
+    (p, _), load = arrow.start(orbit), None
+    tasks = [arrow.task(orbit, times) for times in arrow.runner.sampling.halves]
+    (runs,) = yield from asked(tasks)
+    if not isinstance(runs, str):
+        coarse, fine = map(_force, runs)
+        if coarse and fine:
+            limit = at_zero_step(coarse.value, fine, lag=lag_error(arrow.runner, p, 2))
+            load = limit.times(p.m * p.g)
+    row = arrow.row("moving_force_Ay", orbit, load or math.nan, tasks)
+    yield if_found(row, f"the force of the floor in {arrow.inner.name} is none")
+
+
+def _bracketed_onset(arrow: Arrow, around: Bracket) -> Procedure[None]:
+    """The orbit at which a ball leaves the floor, between one at which it presses and another."""
+
+    def task(omega_c: float, bracket: Bracket, attempt: Attempt) -> Task:
+        return arrow.task(omega_c, attempt.divisor)
+
+    sampling = arrow.runner.sampling
+    width = sampling.thresholds_width * around.high
+    search = Search(around, task, lambda run: _force(run) is not None, width)
+    (bracket,) = yield from narrowed(search, careful=not sampling.granted)
+    last, _ = bracket.runs
+    if bracket.failure or not last or not arrow.staying([last]):
+        slips = "the ball slips before it leaves the floor"
+        yield arrow.missing(f"the run {bracket.failure}" if bracket.failure else slips)
+    else:
+        yield arrow.row("lift_onset", 1 / time_unit(arrow.p), bracket.place, bracket.tasks)
+
+
+def _extrapolated_onset(
+    arrow: Arrow, orbits: Sequence[float], forces: Sequence[Estimate | None]
+) -> Procedure[None]:
+    """The orbit at which the floor's force would be zero, from others just below that at which it
+    is by a line through the last two forces."""
+    pressed = [(w**2, force.value) for w, force in zip(orbits, forces, strict=True) if force]
+    where = 0.0
+    if len(pressed) >= 2 and arrow.inner is not Case.RR:
+        (a, high), (b, low) = pressed[-2:]
+        where = math.sqrt(b + low * (b - a) / (high - low)) if high > low else 0.0
+    nearer = [where * (1 - part) for part in LATER_ORBITS if where]
+    halves = arrow.runner.sampling.halves
+    tasks = [arrow.task(orbit, times) for orbit in nearer for times in halves]
+    (runs,) = yield from asked(tasks)
+    if isinstance(runs, str) or (onset := _onset(runs)) is None:
+        chatters = "the contact at the floor opens and closes"
+        yield arrow.missing(f"the run {runs}" if isinstance(runs, str) else chatters)
+    else:
+        yield arrow.row("lift_onset", 1 / time_unit(arrow.p), onset, tasks)
 
 
 @dataclass(frozen=True)
@@ -629,15 +649,6 @@ def _force(run: Trajectory) -> Estimate | None:
         polynomials(time, force[:pressed], LIFT_DEGREES, begin)[0] / (p.m * p.g)
     ).tolist()
     return estimate(value, degree=uniform(abs(value - lower)))
-
-
-def _load(runner: Runner, runs: Sequence[Trajectory]) -> Estimate | None:
-    """Force of the floor, N, at first, from both steps; None if it doesn't press."""
-    p, coarse, fine = runs[0].header.parameters, *map(_force, runs)
-    if coarse is None or fine is None:
-        return None
-    best = at_zero_step(coarse.value, fine, lag=lag_error(runner, p, 2))
-    return best.times(p.m * p.g)
 
 
 def _onset(runs: Sequence[Trajectory]) -> Estimate | None:
