@@ -40,7 +40,7 @@ from compare.method.step_pairs import (
     of_three_steps,
     unlike,
 )
-from compare.method.together import together
+from compare.method.together import asked, together
 from compare.plan import Level, sets
 from compare.subjects.attractors import measure as attractors
 from compare.subjects.catalogue import CLAIMS
@@ -573,6 +573,27 @@ def test_bisection_closes_in_on_the_change_unless_runs_are_undecided_or_break_do
     )
     assert broken.low < 0.4 < 0.6 < broken.high
     assert broken.failure == "broke"
+
+
+def test_what_procedures_wait_for_is_carried_out_together(monkeypatch):
+    """Also where one asks for more, or for nothing; rows come procedure by procedure."""
+    carried_out = []
+
+    def groups(runner, asked):
+        carried_out.append(asked)
+        return iter(asked)
+
+    def procedure(name, *rounds):
+        for wanted in rounds:
+            for got in (yield from asked(*wanted)):
+                yield f"{name} {got}"
+        yield f"{name} ends"
+
+    monkeypatch.setattr(Runner, "groups", groups)
+    procedures = procedure("a", ["1", "2"], ["3"]), procedure("b"), procedure("c", ["4"])
+    rows = [*together(None, procedures)]
+    assert rows == ["a 1", "a 2", "a 3", "a ends", "b ends", "c 4", "c ends"]
+    assert carried_out == [["1", "2", "4"], ["3"]]
 
 
 @pytest.mark.parametrize(
