@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from compare.campaign.tasks import Task
 from compare.method.brackets import Bracket, Search, narrow
-from compare.method.record import Measured, Measurement, Missing
+from compare.method.record import Measurement, Missing
 from compare.method.runner import Runner
 from compare.method.settling import SettlingCriteria, SteadyState, settle_groups
 from compare.method.step_pairs import Start, StepPair, StepPairResult, results_of
@@ -59,9 +59,11 @@ def stepped(*pairs: StepPair) -> Procedure[list[StepPairResult]]:
     return [each for each in found if not isinstance(each, Missing)]
 
 
-def together(runner: Runner, procedures: Iterable[Procedure[None]]) -> Measured:
-    """The rows of procedures, one procedure after the other."""
-    under_way, waiting = list(procedures), dict[int, Wanted]()
+def together(
+    runner: Runner, procedures: Iterable[Procedure[T]]
+) -> Generator[Measurement | Missing, None, list[T]]:
+    """The rows of procedures, one procedure after the other; what each of them comes to."""
+    under_way, waiting, results = list(procedures), dict[int, Wanted](), dict[int, T]()
     rows: list[list[Measurement | Missing]] = [[] for _ in under_way]
 
     def go_on(k: int, answer: list[Any] | None = None) -> None:
@@ -69,9 +71,10 @@ def together(runner: Runner, procedures: Iterable[Procedure[None]]) -> Measured:
             while not isinstance(said := under_way[k].send(answer), Wanted):
                 rows[k].append(said)
                 answer = None
-        except StopIteration:
-            return
-        waiting[k] = said
+        except StopIteration as end:
+            results[k] = end.value
+        else:
+            waiting[k] = said
 
     for k in range(len(under_way)):
         go_on(k)
@@ -85,3 +88,4 @@ def together(runner: Runner, procedures: Iterable[Procedure[None]]) -> Measured:
             go_on(k, [next(answers) for _ in what])
     for own in rows:
         yield from own
+    return [results[k] for k in range(len(under_way))]

@@ -359,20 +359,20 @@ def motions(runner: Runner, sets: Sets, records: Records) -> Measured:
 
     Motions begin at fixed starts. Each piece is short, and begins and ends away from changes of
     case, at which friction builds up or dies out."""
-    seen: dict[str, set[Case]] = {name: set() for name in sets}
-    begun = (_start(*each, *start, "a motion") for each, start in product(sets.items(), STARTS))
-    yield from together(runner, (_cut(runner, start, seen[start.set]) for start in begun))
-    for name, cases in seen.items():
-        if unseen := [case.name for case in Case if case not in cases]:
+    begun = [_start(*each, *start, "a motion") for each, start in product(sets.items(), STARTS)]
+    ended = yield from together(runner, (_cut(runner, start) for start in begun))
+    for name in sets:
+        own = (cases for start, cases in zip(begun, ended, strict=True) if start.set == name)
+        if unseen := [case.name for case in sorted(set(Case).difference(*own))]:
             yield runner.missing(name, f"no piece of a motion ended in {', '.join(unseen)}", 0)
 
 
-def _cut(runner: Runner, start: Start, seen: set[Case]) -> Procedure[None]:
-    """The pieces of one motion; the cases in which they end are added to others."""
+def _cut(runner: Runner, start: Start) -> Procedure[set[Case]]:
+    """The pieces of one motion, and the cases in which they end."""
     p, count, step = start.p, runner.sampling.motions_pieces, coarse_step(start.p) / STEP_RATIO
     t_end, rows = round(6.0 * time_unit(p) / step) * step, count * (1 + TURNS)
     whole = StepPair(**vars(start), t_end=t_end, divisors=(STEP_RATIO,), rows=rows)
-    again = list[StepPair]()
+    again, seen = list[StepPair](), set[Case]()
     for motion in (yield from stepped(whole)):
         run = motion.fine
         chosen = pieces(run, count)
@@ -393,6 +393,7 @@ def _cut(runner: Runner, start: Start, seen: set[Case]) -> Procedure[None]:
             again.append(StepPair(start.set, p, case.name, x, time, divisors, at=at, rows=TURNS))
     for piece in (yield from stepped(*again)):
         yield from _turns_at_end(piece)
+    return seen
 
 
 def _turns_at_end(piece: StepPairResult) -> Measured:

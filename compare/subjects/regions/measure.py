@@ -160,24 +160,23 @@ def borders(runner: Runner, sets: Sets, records: Records) -> Measured:
             yield runner.missing(name, "at no flow are a slipping ball and a lifted one settled")
     at_quick = runner.level is Level.QUICK
     soonest = max(limits, key=lambda name: sets[name].c, default="") if at_quick else ""
-    edges = list[Edge]()
     flows = (
         (name, sets[name].replace(omega_0=low + part * (high - low)))
         for name, (low, high) in limits.items()
         for part in (CLOSING if name == soonest else runner.sampling.edge_flows)
     )
-    yield from together(runner, (_follow(runner, name, p, edges) for name, p in flows))
+    edges = yield from together(runner, (_follow(runner, name, p) for name, p in flows))
     for name, (low, high) in limits.items():
         last = low + (max(CLOSING) + 1e-6) * (high - low)
-        near = [edge for edge in edges if edge.set == name and edge.p.omega_0 < last]
+        near = [edge for edge in edges if edge and edge.set == name and edge.p.omega_0 < last]
         if len(near) >= len(CLOSING):
             yield _where_it_begins(sorted(near, key=lambda edge: edge.p.omega_0))
         elif name == soonest or not at_quick:
             yield runner.missing(name, "too few crossings to follow the edge to the lifted ball")
 
 
-def _follow(runner: Runner, name: str, p: Parameters, edges: list[Edge]) -> Procedure[None]:
-    """The state on the border at a flow; the edge is added to others if lines crossed it."""
+def _follow(runner: Runner, name: str, p: Parameters) -> Procedure[Edge | None]:
+    """The state on the border at a flow, where lines crossed it."""
     starts = [initial_condition(name, p, how) for how in ("rest", "on the wall")]
     (both,) = yield from settled(starts, criteria=SettlingCriteria(loose=10.0))
     slipping, lifted = both
@@ -185,7 +184,7 @@ def _follow(runner: Runner, name: str, p: Parameters, edges: list[Edge]) -> Proc
         came_to = ", ".join(state.failure or state.case.name for state in both)
         why = f"no two attractors settled at omega_0 = {p.omega_0:.4g} rad/s: {came_to}"
         yield runner.missing(name, why)
-        return
+        return None
     # on floor and wall: a lifted ball moves alike at every height
     a, b = (constrained(Case.SS, state.mean, p) for state in both)
     line, edge, missed, moves = Line(a, b - a), None, 0, list[Array]()
@@ -198,13 +197,13 @@ def _follow(runner: Runner, name: str, p: Parameters, edges: list[Edge]) -> Proc
             before, edge = edge, Edge(runner, name, p, b, line, bracket)
             moves = [*moves, np.abs(edge.crossing - before.crossing)] if before else []
             line, missed = edge.next_line(), 0
-    if edge and moves:  # it was crossed by the last line, and by one before
-        edge = replace(edge, moves=tuple(moves))
-        yield from edge.rows()
-        edges.append(edge)
-    else:
+    if not (edge and moves):  # it is to be crossed by the last line, and by one before
         at = f"at omega_0 = {p.omega_0:.4g} rad/s"
         yield runner.missing(name, f"{at} the last lines missed the border", 5)
+        return None
+    edge = replace(edge, moves=tuple(moves))
+    yield from edge.rows()
+    return edge
 
 
 class Line(NamedTuple):
