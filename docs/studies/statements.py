@@ -55,8 +55,7 @@ TESTS = {
     "test_other_ways::test_the_least_friction_that_rolls_against_the_torque_of_the_fluid": (
         "extension",
         "A fluid that resists the ball's spin uses up friction; the least with which it still "
-        "rolls "
-        "follows from balances.",
+        "rolls follows from balances.",
     ),
     "test_other_ways::"
     "test_the_best_design_has_a_wall_as_rough_as_the_inertia_and_the_smallest_ball": (
@@ -70,9 +69,8 @@ TESTS = {
     ),
     "test_flowmeter::test_a_mean_is_off_by_the_spin_about_the_tangent": (
         "(20), (4)",
-        "Under Stokes' law the mean reading of a periodic motion is off by the mean of ω_c "
-        "ω_z: not "
-        "at all in RR, RS and SR.",
+        "Under Stokes' law the mean reading of a periodic motion is off by the mean of ω_c ω_z: "
+        "not at all in RR, RS and SR.",
     ),
 }
 """Tests of `tests/analytic` that hold a statement which no measurement shows: its source, and what
