@@ -82,14 +82,10 @@ def motion(run: Trajectory | xarray.Dataset, *names: str, axes: Axes | None = No
     named as in `Trajectory.to_pandas`, ``force_Ay``. Raises `InputError` for an unknown name, or
     for quantities of different units."""
     if not hasattr(run, "force_A"):
-        raise InputError(
-            "the run must be as its file is: open it without engine='dualball', which makes a "
-            "table of it"
-        )
-    names = names or ("omega_c",)
-    check_names(
-        names, [name for name in UNITS if name not in ("time", "case")], "quantity of a motion"
-    )
+        how = "open it without engine='dualball', which makes a table of it"
+        raise InputError(f"the run must be as its file is: {how}")
+    names, known = names or ("omega_c",), [n for n in UNITS if n not in ("time", "case")]
+    check_names(names, known, "quantity of a motion")
     units = {UNITS[name]: name for name in names}
     if len(units) > 1:
         raise InputError(f"{' and '.join(units.values())} have different units: {', '.join(units)}")
@@ -98,9 +94,8 @@ def motion(run: Trajectory | xarray.Dataset, *names: str, axes: Axes | None = No
         axes.plot(time, component(run, name), label=style.symbol(name))
     begins = np.flatnonzero(np.diff(case, prepend=-1))
     for first, last in zip(begins, [*begins[1:], len(case) - 1], strict=True):
-        axes.axvspan(
-            time[first], time[last], color=style.COLOURS[Case(case[first])], alpha=0.15, lw=0
-        )
+        colour = style.COLOURS[Case(case[first])]
+        axes.axvspan(time[first], time[last], color=colour, alpha=0.15, lw=0)
     (unit,) = units
     said = ", ".join(dict.fromkeys(str(line.get_label()) for line in axes.get_lines()))
     axes.set(xlabel="time (s)", ylabel=f"{said} ({pages.readable(unit)})", xlim=time[[0, -1]])

@@ -22,9 +22,8 @@ _ROW = "dualball"
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options of the plugin to pytest."""
     group = parser.getgroup("dualball", "exact contact cases")
-    engine = (
-        "test an engine on the exact cases: a module with build, step and state, or MODULE:OBJECT"
-    )
+    form = "a module with build, step and state, or MODULE:OBJECT"
+    engine = f"test an engine on the exact cases: {form}"
     group.addoption("--dualball-engine", metavar="MODULE", help=engine)
     known = "cases that are known to fail, one a line: the name, then the reason"
     group.addoption("--dualball-known", metavar="FILE", type=Path, help=known)
@@ -64,9 +63,8 @@ def pytest_collection_modifyitems(
             return begun
 
         for name, case in own.items():
-            item = ExactCase.from_parent(
-                session, name=name, nodeid=f"{engine}::{name}", case=case, trial=trial
-            )
+            what = {"name": name, "nodeid": f"{engine}::{name}", "case": case, "trial": trial}
+            item = ExactCase.from_parent(session, **what)
             if name in known:
                 item.add_marker(pytest.mark.xfail(reason=known[name]))
             items.append(item)
@@ -90,13 +88,11 @@ class ExactCase(pytest.Item):
         if found.skipped:
             pytest.skip(found.skipped)
         row = (found.error, found.order, found.creep, found.lost, found.cost)
-        self.user_properties.append(
-            (_ROW, [self.name, *("" if math.isnan(v) else f"{v:.2g}" for v in row)])
-        )
+        cells = ["" if math.isnan(value) else f"{value:.2g}" for value in row]
+        self.user_properties.append((_ROW, [self.name, *cells]))
         if not found.passed:
-            at = ", ".join(
-                f"{e:.2g} at {1e3 * h:g} ms" for e, h in zip(found.errors, found.steps, strict=True)
-            )
+            steps = zip(found.errors, found.steps, strict=True)
+            at = ", ".join(f"{error:.2g} at {1e3 * h:g} ms" for error, h in steps)
             errors = f"{self.case.about}: errors, in units of its scales, are {at}"
             said = found.failure or f"{errors}; allowed is {TOLERANCE:g}"
             pytest.fail(said, pytrace=False)
@@ -114,9 +110,8 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
             properties = getattr(report, "user_properties", [])
             rows += [[*row, verdict] for name, row in properties if name == _ROW]
     if len(rows) > 1:
-        terminalreporter.section(
-            "exact cases: error at the shortest step in units of the case's scales"
-        )
+        what = "error at the shortest step in units of the case's scales"
+        terminalreporter.section(f"exact cases: {what}")
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         for first, *row in rows:
             cells = (cell.rjust(width) for cell, width in zip(row, widths[1:], strict=True))

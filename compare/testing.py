@@ -78,14 +78,8 @@ class Series:
         return self.values[quantity]
 
 
-Source = (
-    Series
-    | Trajectory
-    | str
-    | Path
-    | Mapping[str, npt.ArrayLike]
-    | tuple[npt.ArrayLike, npt.ArrayLike]
-)
+Arrays = Mapping[str, npt.ArrayLike] | tuple[npt.ArrayLike, npt.ArrayLike]
+Source = Series | Trajectory | str | Path | Arrays
 """A motion: what `read` takes."""
 
 
@@ -200,16 +194,10 @@ def difference(a: Series, b: Series, quantity: str) -> Difference:
         # Between every second sample linear interpolation is off by four times as much.
         coarser = np.interp(t[1::2], t[::2], values[::2]) - values[1::2]
         doubts.append(0.0 if np.isin(times, t).all() else _rms(coarser) / 4)
-    off = np.abs(rows[0] - rows[1])
+    off, scale = np.abs(rows[0] - rows[1]), float(np.abs(rows[1]).max())
     k = int(off.argmax())
-    return Difference(
-        quantity,
-        _rms(off),
-        float(off[k]),
-        float(times[k]),
-        float(np.abs(rows[1]).max()),
-        math.hypot(*doubts),
-    )
+    largest, at = float(off[k]), float(times[k])
+    return Difference(quantity, _rms(off), largest, at, scale, math.hypot(*doubts))
 
 
 def _rms(values: Array) -> float:

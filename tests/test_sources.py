@@ -15,7 +15,7 @@ EXCEPTIONS = {
     # calls of users, whose options have names and defaults
     *("analytic/simulation/ensemble.py:simulate_many", "analytic/simulation/simulator.py:simulate"),
     *("mjsim/engine.py:__init__", "mjsim/engine.py:simulate", "mjsim/engine.py:simulate_many"),
-    *("compare/validation.py:validate", "compare/view/page.py:save"),
+    "compare/validation.py:validate",
     *("analytic/flowmeter/design.py:best", "mjsim/coulomb/coulomb.py:__init__"),
     # compiled by numba, which takes numbers and arrays, and formulas in the form that is compiled
     "analytic/simulation/equations.py:forces",

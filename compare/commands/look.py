@@ -14,7 +14,6 @@ from model.parameters import check_names
 
 
 def figures(args: argparse.Namespace) -> int:
-    """Draw every figure, or those named; one whose results are missing is told of."""
     from compare import validation  # here, because drawing takes a second to load
     from compare.report import gallery as registry
     from compare.report import results
@@ -42,7 +41,6 @@ def figures(args: argparse.Namespace) -> int:
 
 
 def inspect(args: argparse.Namespace) -> int:
-    """Describe what a file of a run or a collection holds, or the chain of a claim."""
     if args.claim:
         return _chain(args)
     if args.file is None:
@@ -67,7 +65,6 @@ def inspect(args: argparse.Namespace) -> int:
 
 
 def _chain(args: argparse.Namespace) -> int:
-    """Show the chain of a claim, with the numbers of a validation if there is one."""
     from compare import validation  # here, because it loads everything there is
     from compare.report import chain, results
 
@@ -80,7 +77,6 @@ def _chain(args: argparse.Namespace) -> int:
 
 
 def compare(args: argparse.Namespace) -> int:
-    """Lay two motions side by side, or a measured curve and theory."""
     if args.b is None:
         from compare.commands import measured  # here, because two motions need no theory
 
@@ -96,17 +92,15 @@ def compare(args: argparse.Namespace) -> int:
 
 
 def render(args: argparse.Namespace) -> int:
-    """Write the motion in 3-D as a page."""
     from compare.view import page  # here, because drawing takes a second to load
 
     asked = {name: getattr(args, name) for name in ("at", "time", "speed", "rate")}
     asked = {name: value for name, value in asked.items() if value is not None}
-    print(page.save(storage.load(args.file), args.output, **asked, tell=args.tell))
+    print(page.save(storage.load(args.file), args.output, **asked))
     return 0
 
 
 def explore(args: argparse.Namespace) -> int:
-    """Serve the page of theory and motion to play with."""
     from compare.view import explore as served  # here, because nothing else needs it
 
     served.serve(options.parameters(args), args.port, not args.no_browser)

@@ -16,7 +16,6 @@ from rich.text import Text
 from compare.campaign import progress
 from compare.commands import options, running
 from compare.figures import pages
-from compare.figures.pages import readable
 from compare.plan import Level, sets
 from compare.report import results, wording
 from compare.subjects.catalogue import CLAIMS
@@ -28,7 +27,6 @@ _STYLES = {"pass": "green", "fail": "bold red", "other": "yellow", "none": "dim"
 
 
 def run(args: argparse.Namespace) -> int:
-    """Measure and judge claims, or list them; return the exit code."""
     from compare import validation  # here, because it loads everything there is
 
     console, chosen = options.terminal(quiet=args.json), options.own_set(args) or None
@@ -56,13 +54,11 @@ def run(args: argparse.Namespace) -> int:
             progress=show,
             announce=announce,
         )
-    return _finish(
-        verdicts, {Outcome.NOT_RUN, Outcome.INCONCLUSIVE} if chosen else set(), args, console
-    )
+    spared = {Outcome.NOT_RUN, Outcome.INCONCLUSIVE} if chosen else set()
+    return _finish(verdicts, spared, args, console)
 
 
 def judge(args: argparse.Namespace) -> int:
-    """Judge the stored measurements of a validation again; return the exit code."""
     from compare import validation  # here, because it loads everything there is
 
     console = options.terminal(quiet=args.json)
@@ -70,16 +66,9 @@ def judge(args: argparse.Namespace) -> int:
     console.print(head())
     for verdict in verdicts:
         console.print(line(verdict), soft_wrap=True)
-    known = sets(Level.FULL)
-    own = any(
-        check.measurement.set not in known for verdict in verdicts for check in verdict.checks
-    )
-    return _finish(
-        verdicts,
-        {Outcome.NOT_RUN, Outcome.INCONCLUSIVE} if own else {Outcome.NOT_RUN},
-        args,
-        console,
-    )
+    measured = {check.measurement.set for verdict in verdicts for check in verdict.checks}
+    own = {Outcome.INCONCLUSIVE} if measured - {*sets(Level.FULL)} else set()
+    return _finish(verdicts, {Outcome.NOT_RUN} | own, args, console)
 
 
 def _finish(
@@ -108,9 +97,8 @@ def line(verdict: Verdict) -> Text:
     """A claim in a line of at most `WIDTH` columns: verdict, id, what it says in short, how many
     numbers, the worst one's share of its tolerance, and what the engines beside say."""
     kind, mark = wording.MARKS[Outcome.CONFIRMED if verdict.passed else verdict.outcome]
-    shown = Text.assemble(
-        (f"{mark} {verdict.outcome:<13}", _STYLES[kind]), f"{verdict.claim.id:<19}"
-    )
+    shown = Text(f"{mark} {verdict.outcome:<13}", _STYLES[kind])
+    shown = Text.assemble(shown, f"{verdict.claim.id:<19}")
     if verdict.outcome is Outcome.NOT_RUN or verdict.error or not verdict.checks:
         return shown.append(_short(why_no_numbers(verdict), WIDTH - len(shown.plain)), "dim")
     said = _short(verdict.claim.statement, SAYS)
@@ -118,26 +106,22 @@ def line(verdict: Verdict) -> Text:
     for each in verdict.engines[1:]:
         if each.outcome is not Outcome.NOT_ASKED:
             kind, mark = wording.MARKS[each.outcome]
-            shown.append(f"{each.engine.removeprefix('mujoco-')} ").append(
-                f"{mark} ", _STYLES[kind]
-            )
+            shown.append(f"{each.engine.removeprefix('mujoco-')} ")
+            shown.append(f"{mark} ", _STYLES[kind])
     shown.rstrip()
     return shown
 
 
 def _short(text: str, width: int) -> str:
-    """The first words of a text."""
     return textwrap.shorten(text, width, placeholder="…")
 
 
 def _share(verdict: Verdict) -> str:
-    """The worst deviation in parts of its tolerance; a dash for counts and cases."""
     worst = verdict.worst
     return "–" if not math.isfinite(worst) else f"{worst:.2f}" if worst < 100 else f"{worst:.1e}"
 
 
 def why_no_numbers(verdict: Verdict) -> str:
-    """Why a claim has none."""
     if verdict.error:
         return verdict.error
     if verdict.outcome is Outcome.NOT_RUN and verdict.claim.level > Level.QUICK:
@@ -148,16 +132,12 @@ def why_no_numbers(verdict: Verdict) -> str:
 def detail(verdict: Verdict) -> Text:
     """All that a verdict says, above the table of its numbers."""
     found = [f"{heading.lower()} {text}" for heading, text in wording.findings(verdict).items()]
-    lines = [
-        f"{verdict.claim.id}: {verdict.claim.statement}",
-        "; ".join(found) or why_no_numbers(verdict),
-    ]
-    lines += [
-        f"{each.engine}: {wording.engine_sentence(each)}"
-        for each in verdict.engines[1:]
-        if each.outcome is not Outcome.NOT_ASKED
-    ]
-    return Text("\n".join(["", *lines]))
+    lines = ["", f"{verdict.claim.id}: {verdict.claim.statement}"]
+    lines.append("; ".join(found) or why_no_numbers(verdict))
+    for each in verdict.engines[1:]:
+        if each.outcome is not Outcome.NOT_ASKED:
+            lines.append(f"{each.engine}: {wording.engine_sentence(each)}")
+    return Text("\n".join(lines))
 
 
 def summary(verdicts: Sequence[Verdict], report: Path) -> Text:
@@ -171,25 +151,29 @@ def summary(verdicts: Sequence[Verdict], report: Path) -> Text:
         for each in wording.engines(ran)[1:]
         if each["asked"] != "0"
     ]
-    if beside:
-        shown.append(
-            f"\nBeside it {', '.join(beside)}: none of that counts in the exit code.", "not bold"
-        )
-    said = [f"\nEvery number is in {report}, and printed by --verbose"]
-    said += filter(None, [wording.coarse_and_missing(ran).rstrip(".")])
-    shown.append(f"{'; '.join(said)}.", "not bold")
-    return shown
+    said = f"\nBeside it {', '.join(beside)}: none of that counts in the exit code." * bool(beside)
+    said += f"\nEvery number is in {report}, and printed by --verbose"
+    if unsure := wording.coarse_and_missing(ran).rstrip("."):
+        said += f"; {unsure}"
+    return shown.append(f"{said}.", "not bold")
 
 
 def checks(verdict: Verdict) -> Table:
     """A table of every measured number of a claim beside its prediction."""
-    head = ["set", "ω₀ (rad/s)", "quantity", "predicted", "measured", "deviation", "tolerance"]
-    rows = [[*head, "", "with"]]
-    for check in verdict.checks:
-        m = check.measurement
-        numbers = wording.value(m, check.predicted), wording.value(m, m.value)
-        sizes = wording.size(check.deviation, "+"), wording.size(check.tolerance)
-        what = f"{wording.SYMBOLS[m.quantity]} {readable(m.unit)}".rstrip()
-        found = [what, *numbers, *sizes, wording.mark(check), wording.conditions(m.at)]
-        rows.append([m.set, f"{m.parameters.omega_0:.6g}", *found])
-    return pages.table(f"{verdict.claim.id}  {verdict.claim.statement}", rows, no_wrap=True)
+    rows = [
+        {
+            "set": m.set,
+            "ω₀ (rad/s)": f"{m.parameters.omega_0:.6g}",
+            "quantity": wording.symbol_and_unit(m),
+            "predicted": wording.value(m, check.predicted),
+            "measured": wording.value(m, m.value),
+            "deviation": wording.size(check.deviation, "+"),
+            "tolerance": wording.size(check.tolerance),
+            "": wording.mark(check),
+            "with": wording.conditions(m.at),
+        }
+        for check in verdict.checks
+        for m in [check.measurement]
+    ]
+    title = f"{verdict.claim.id}  {verdict.claim.statement}"
+    return pages.table(title, pages.by_heading(rows), no_wrap=True)

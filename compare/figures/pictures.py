@@ -16,6 +16,7 @@ from collections.abc import Mapping
 from typing import Any
 from xml.etree import ElementTree
 
+import matplotlib
 import numpy as np
 from matplotlib import textpath
 from matplotlib.artist import Artist
@@ -63,7 +64,8 @@ def svg(figure: Figure) -> str:
         second.draw(renderer(1, 1, io.StringIO()))  # it knows its limits only once it was drawn
     # draws once; `Figure.savefig` would do so twice, for the layout
     canvas: Any = FigureCanvasSVG(figure)
-    canvas.print_svg(out, metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
+    with matplotlib.rc_context({"svg.hashsalt": "dualball"}):  # else ids are random
+        canvas.print_svg(out, metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
     root = ElementTree.fromstring(re.sub(rb">\s+<", b"><", out.getvalue()))
     for group in root.iter(f"{_SVG}g"):
         if part := parts.get(group.attrib.pop("id", "")):
@@ -73,7 +75,6 @@ def svg(figure: Figure) -> str:
             else:
                 group.set("data-series", name)
         _join_marks(group)
-    _renumber(root)
     text = ElementTree.tostring(root, encoding="unicode")
     # Places rounded to hundredths of a point, and no superfluous spaces: half as long.
     short = functools.partial(re.sub, r" +(?=[ \"])|(?<=\.\d\d)\d+", "")
@@ -92,7 +93,7 @@ def embedded(pictures: Mapping[str, str]) -> tuple[dict[str, str], str]:
         # for all lines of a picture: pages have it, too
         text = re.sub(r"<style.*?</style>", "", text)
         text = text.replace("xlink:href", "href")
-        text = re.sub(r'(id="|url\(#|href="#)(n\d+)\b', rf"\1f{k}\2", text)
+        text = re.sub(r'(\bid="|url\(#|href="#)(\w+)\b(?!-)', rf"\1f{k}\2", text)
         start = re.match(r'<svg[^>]*?(viewBox="0 0 ([\d.]+)[^"]*")[^>]*>', text)
         assert start
         # letters of 10 points are at least 6.4 pixels high on a phone
@@ -158,23 +159,3 @@ def _join_marks(group: ElementTree.Element) -> None:
     group.append(shape)
     path = {"d": way, "fill": "none", "stroke": "none", **ends}
     ElementTree.SubElement(group, f"{_SVG}path", path)
-
-
-def _renumber(root: ElementTree.Element) -> None:
-    """Number the ids in an SVG in order, but those of letters: matplotlib's own are random."""
-    names: dict[str, str] = {}
-
-    def new_name(found: re.Match[str]) -> str:
-        before, name = found[1], found[2]
-        return before + (name if "-" in name else names.setdefault(name, f"n{len(names)}"))
-
-    markers = "marker-start", "marker-mid", "marker-end"
-    for each in root.iter():
-        for attribute in (f"{_XLINK}href", "clip-path", "style", *markers):
-            if "#" in (text := each.get(attribute, "")):
-                each.set(attribute, re.sub(r"(^#|url\(#)([\w-]+)", new_name, text))
-    for each in root.iter():
-        if "id" in each.attrib and "-" not in each.attrib["id"]:
-            name = each.attrib.pop("id")
-            if name in names:
-                each.set("id", names[name])

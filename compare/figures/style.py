@@ -45,7 +45,9 @@ Line = str | tuple[object, ...]
 STABLE, UNSTABLE = "-", (0, (5, 2.5))
 _TURN = 4.0
 """How long each colour of a line of several cases is, in widths of the line."""
-Place = tuple[float, tuple[float, float]]
+Offset = tuple[float, float]
+"""In points."""
+Place = tuple[float, Offset]
 """Where the name of a curve stands: at a share of its length, with an offset in points."""
 Name = tuple[str, Place | None]
 """What a curve is called, and where that stands if anywhere."""
@@ -89,15 +91,8 @@ def panels(
     return made, made.subplots(rows, columns, **layout)
 
 
-_COLUMNS = {
-    "theta": "θ",
-    "h": "h",
-    "v_h": "v_h",
-    "slip_speed_A": "|v_A|",
-    "slip_speed_B": "|v_B|",
-    "gap_A": "gap at the floor",
-    "gap_B": "gap at the wall",
-}
+_COLUMNS = {"theta": "θ", "h": "h", "v_h": "v_h", "slip_speed_A": "|v_A|", "slip_speed_B": "|v_B|"}
+_COLUMNS |= {"gap_A": "gap at the floor", "gap_B": "gap at the wall"}
 """Letters of columns of a motion that nothing measures."""
 
 
@@ -120,9 +115,8 @@ OMEGA_0, OMEGA_C, OMEGA_X = (
 
 def named(p: Parameters, *names: str) -> str:
     """Dimensionless parameters for a caption, by default without omega_0, and the drag law."""
-    values = [
-        f"{SYMBOLS[name]} = {getattr(p, name):.3g}" for name in names or ("mu", "eta", "j", "kappa")
-    ]
+    names = names or ("mu", "eta", "j", "kappa")
+    values = [f"{SYMBOLS[name]} = {getattr(p, name):.3g}" for name in names]
     if p.drag != STOKES:
         Re = 2 * p.r * math.sqrt(p.g * p.R) / p.nu_f
         values.append(f"{p.drag} drag with Re = {Re:.3g} at √(gR)")
@@ -138,10 +132,8 @@ def marks(states: Sequence[Measurement]) -> str:
     """The part of a caption that explains the marks of measured points, if any."""
     if not states:
         return ""
-    said = ""
-    if any(m.protocol == "edge" for m in states):
-        said += " On the unstable SS: the edge between two motions, which the engine was made to"
-        said += " follow."
+    edge = " On the unstable SS: the edge between two motions, which the engine was made to follow."
+    said = edge * any(m.protocol == "edge" for m in states)
     said += f" Marks: measured ({len(states)}); bars: three standard uncertainties, hidden where"
     said += " the mark is larger."
     most = max(abs(m.value) for m in states)
@@ -149,9 +141,8 @@ def marks(states: Sequence[Measurement]) -> str:
         said += f" Pale: known to no better than {LONGEST_BAR:.0%} of the axis, without a bar."
     if alone := dict.fromkeys(m.engine for m in states if ENGINES[m.engine].divisors != (1,)):
         steps = sorted({500 * coarse_step(m.parameters) for m in states if m.engine in alone})
-        at = " or ".join(f"{step:g}" for step in steps)
-        said += f" {' and '.join(alone)}: as measured with a time step of {at} ms, not in the"
-        said += " zero-step limit."
+        at = f"with a time step of {' or '.join(f'{step:g}' for step in steps)} ms"
+        said += f" {' and '.join(alone)}: as measured {at}, not in the zero-step limit."
     return said
 
 
@@ -201,19 +192,14 @@ def curve(
         beside(axes, here_x, here_y, text, offset, COLOURS[cases[-1]]).set_label(label)
 
 
-def mark(axes: Axes, x: float, y: float, text: str, offset: tuple[float, float]) -> None:
+def mark(axes: Axes, x: float, y: float, text: str, offset: Offset) -> None:
     """Draw a black dot with its name beside it, `offset` in points."""
     axes.plot([x], [y], **POINT)
     beside(axes, x, y, text, offset)
 
 
 def beside(
-    axes: Axes,
-    x: float,
-    y: float,
-    text: str,
-    offset: tuple[float, float] = (0, 0),
-    colour: str = "k",
+    axes: Axes, x: float, y: float, text: str, offset: Offset = (0, 0), colour: str = "k"
 ) -> Text:
     """Write a name beside a point or curve, `offset` in points; far off with a line."""
     leader = {"arrowstyle": "-", "lw": 0.7, "color": "0.4", "shrinkB": 1}

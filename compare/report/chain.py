@@ -13,7 +13,7 @@ from typing import Any
 
 from compare import plan
 from compare.engines.study import ENGINES
-from compare.figures.pages import Rows, pairs, readable, table
+from compare.figures.pages import Rows, by_heading, pairs, readable, table
 from compare.method.quantities import quantity
 from compare.method.record import Check, Measurement
 from compare.plan import Level
@@ -104,24 +104,24 @@ def _judged(criterion: Criterion, checks: list[Check]) -> list[Link]:
 
 def numbers(checks: list[Check]) -> Rows:
     """The worst numbers of a criterion: measured, predicted, and what they can tell."""
-    head = ["set", "ω₀ (rad/s)", "measured", "± u", "predicted", "off/tolerance", "resolution"]
-    rows = [[*head, "required", "", "with"]]
-    for check in wording.ranked(checks)[:LISTED]:
-        m = check.measurement
-        unit = readable(m.unit)
-        sizes = wording.size(m.uncertainty), wording.value(m, check.predicted)
-        powers = [wording.size(each) for each in (check.resolution, check.required_resolution)]
-        measured = f"{wording.value(m, m.value)} {unit}".rstrip()
-        found = [
-            measured,
-            *sizes,
-            f"{check.share:.2g}",
-            *powers,
-            wording.mark(check),
-            wording.conditions(m.at),
+    return by_heading(
+        [
+            {
+                "set": m.set,
+                "ω₀ (rad/s)": f"{m.parameters.omega_0:.6g}",
+                "measured": f"{wording.value(m, m.value)} {readable(m.unit)}".rstrip(),
+                "± u": wording.size(m.uncertainty),
+                "predicted": wording.value(m, check.predicted),
+                "off/tolerance": f"{check.share:.2g}",
+                "resolution": wording.size(check.resolution),
+                "required": wording.size(check.required_resolution),
+                "": wording.mark(check),
+                "with": wording.conditions(m.at),
+            }
+            for check in wording.ranked(checks)[:LISTED]
+            for m in [check.measurement]
         ]
-        rows.append([m.set, f"{m.parameters.omega_0:.6g}", *found])
-    return rows
+    )
 
 
 def asked_of_theory(criterion: Criterion, m: Measurement) -> list[tuple[str, str]]:
@@ -155,7 +155,6 @@ def place(function: Callable[..., Any]) -> str:
 
 
 def shown(chain: Iterable[Link]) -> list[Any]:
-    """The chain for the terminal."""
     parts: list[Any] = []
     for link in chain:
         parts.append(pairs({link.what: f"{link.text}\n{link.place}".rstrip()}))
@@ -165,7 +164,6 @@ def shown(chain: Iterable[Link]) -> list[Any]:
 
 
 def described(chain: Iterable[Link]) -> list[dict[str, Any]]:
-    """The chain as JSON-able data."""
     return [
         {"what": link.what, "text": link.text, "place": link.place}
         | ({"numbers": link.numbers} if link.numbers else {})

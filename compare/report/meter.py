@@ -29,9 +29,6 @@ MEANING = {
     "eta_cr": "least wall friction for which there is a fold",
 }
 """What happens at a threshold."""
-_NONE = "–"
-
-
 AT_WALLS = (
     "Left out is what walls add to drag: in slow flow a wall that the ball touches makes c about "
     f"{real_fluid.AT_A_WALL:.2g} times as large, and η_cr {real_fluid.AT_A_WALL**2:.2g} times."
@@ -43,20 +40,17 @@ def rounded(value: float, off: float = 0.0, most: int = 4) -> str:
 
     With fewer than three what differs by half would look alike."""
     if not math.isfinite(value):
-        return _NONE
-    left = most
+        return "–"
     if abs(value) < 1e-15:  # round-off
         return "0"
+    digits = most
     if off:
-        size = abs(value)
-        left = min(
-            most, max(3, math.floor(math.log10(size)) - math.floor(math.log10(size * off)) + 1)
-        )
-    return f"{float(f'{value:.{left}g}'):.{max(most, 6)}g}"
+        size, error = (math.floor(math.log10(x)) for x in (abs(value), abs(value) * off))
+        digits = min(most, max(3, size - error + 1))
+    return f"{float(f'{value:.{digits}g}'):.{max(most, 6)}g}"
 
 
 def sentences(made: Design) -> list[str]:
-    """What a design of a flowmeter amounts to, in sentences."""
     chosen, request, curve, off, said = made.choice, made.request, made.curve, made.model_error, []
     if chosen.margin < 1:
         said.append(f"No meter within the bounds covers the flows up to {request.fastest:g} rad/s.")
@@ -114,7 +108,6 @@ def rows(made: Design) -> dict[str, pages.Rows]:
         "time constant (s)": [c.response for c in best.values()],
     }
     limits = {name: [rounded(x, off) for x in row] for name, row in numbers.items()}
-    spread = {key: [getattr(made.thresholds, key), *made.spread[key]] for key in THRESHOLDS}
     values = {
         _symbol_and_unit(name): [rounded(c.values[name]) for c in best.values()]
         for name in made.choice.values
@@ -125,24 +118,19 @@ def rows(made: Design) -> dict[str, pages.Rows]:
         # Differences of two widths leave 1e-4 of what should be zero.
         shown = ("0" if abs(value) < 5e-4 else rounded(value, off) for value in slopes)
         sensitivities.append([SYMBOLS.get(name, name), *shown])
+    meters = [["", *best], *([name, *row] for name, row in (values | limits).items())]
+    thresholds = [["threshold", "nominal (rad/s)", "lowest", "highest", "what happens there"]]
+    for key in THRESHOLDS:
+        spread = getattr(made.thresholds, key), *made.spread[key]
+        thresholds.append([SYMBOLS[key], *(rounded(x, off) for x in spread), MEANING[key]])
     return {
-        "The best of each material": [
-            ["", *best],
-            *([name, *row] for name, row in (values | limits).items()),
-        ],
-        "Thresholds": [
-            ["threshold", "nominal (rad/s)", "lowest", "highest", "what happens there"],
-            *(
-                [SYMBOLS[key], *(rounded(x, off) for x in row), MEANING[key]]
-                for key, row in spread.items()
-            ),
-        ],
+        "The best of each material": meters,
+        "Thresholds": thresholds,
         "Sensitivities": sensitivities,
     }
 
 
 def tables(made: Design) -> list[Table | str]:
-    """Tables and sentences of a design, for the terminal."""
     shown = [pages.table(title, own) for title, own in rows(made).items()]
     refused = [f"{name} can't be used: {why}" for name, why in made.refused.items()]
     return [*model_warning(made.model_error), *shown, *refused, *sentences(made)]
@@ -193,30 +181,24 @@ def page(made: Design) -> str:
     spans = {
         n: f"{low:g} … {high:g}" if low < high else f"{low:g}" for n, (low, high) in bounds.items()
     }
+    tolerances = (f"{SYMBOLS.get(n, n)} ± {100 * t:g} %" for n, t in r.tolerances.items())
     asked = {
         "fluid": _values_as_text(r.fluid),
         "flow": f"ω₀ = {r.slowest:g} … {r.fastest:g} rad/s{response}",
         "bounds": ", ".join(f"{_symbol_and_unit(name)} {span}" for name, span in spans.items()),
-        "tolerances": ", ".join(
-            f"{SYMBOLS.get(n, n)} ± {100 * t:g} %" for n, t in r.tolerances.items()
-        )
-        or "none",
+        "tolerances": ", ".join(tolerances) or "none",
     }
-    drawn, letters = embedded(
-        {caption: svg(figure) for figure, caption in (draw(made) for draw in OF_A_METER)}
-    )
-    texts = {
-        "doubts": model_warning(made.model_error),
-        "sentences": sentences(made),
-        "tables": rows(made).items(),
-    }
+    drawn = (draw(made) for draw in OF_A_METER)
+    figures, letters = embedded({caption: svg(figure) for figure, caption in drawn})
     return pages.render(
         "compare.report",
         "meter.html",
         made=made,
-        **texts,
+        doubts=model_warning(made.model_error),
+        sentences=sentences(made),
+        tables=rows(made).items(),
         asked=asked,
-        figures=drawn,
+        figures=figures,
         letters=letters,
     )
 

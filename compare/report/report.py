@@ -39,19 +39,10 @@ def write(
 ) -> Path:
     """Write ``summary.json`` and ``report.html`` into the directory; return the page's path.
 
-    Figures are drawn by `spread`, a `map`. Raises `model.StorageError` if it can't be written."""
+    What was not run is named in one line. Figures are drawn by `spread`, a `map`. Raises
+    `model.StorageError` if it can't be written."""
     directory = evidence.directory
     results.save(summary, directory)
-    path = directory / results.REPORT
-    write_text(path, render(evidence, verdicts, summary, spread))
-    return path
-
-
-def render(
-    evidence: Evidence, verdicts: Sequence[Verdict], summary: Summary, spread: Spread = map
-) -> str:
-    """The page as text; what was not run is named in one line."""
-    directory = evidence.directory
     ran = [verdict for verdict in verdicts if verdict.outcome is not Outcome.NOT_RUN]
     free = {name: each for name, each in FIGURES.items() if not each.claims}
     beside = {verdict.claim.id: figures_of(verdict.claim.id) for verdict in ran if verdict.checks}
@@ -61,10 +52,10 @@ def render(
     figures, letters = pictures(evidence, drawings, spread)
     first = "characteristic"  # a meter's reading by theory and every engine: what all is about
     apart = [figures[name] for name in sorted(free, key=lambda name: name != first)]
-    measured = {name for m in evidence.records.measurements for name in m.runs}
-    sets = {m.set for m in evidence.records.measurements}
-    repeat = f"{_OPTIONS[Level[summary.level]]} -o {directory.resolve().name}"
-    return pages.render(
+    measured = evidence.records.measurements
+    runs, sets = {name for m in measured for name in m.runs}, {m.set for m in measured}
+    name = directory.resolve().name
+    page = pages.render(
         "compare.report",
         "report.html",
         letters=letters,
@@ -78,10 +69,10 @@ def render(
         answers=wording.answers(ran),
         tiles=[
             *wording.totals(ran),
-            (str(len(measured)), f"simulations with {len(sets)} parameter sets"),
+            (str(len(runs)), f"simulations with {len(sets)} parameter sets"),
         ],
         figures=[figure for figure in apart if not figure["gap"]],
-        sections=_sections(ran, beside, figures, repeat),
+        sections=_sections(ran, beside, figures, f"{_OPTIONS[Level[summary.level]]} -o {name}"),
         outcomes=sorted({verdict.outcome for verdict in ran}),
         beside=sorted(
             {f"{each.engine}: {each.outcome}" for verdict in ran for each in verdict.engines[1:]}
@@ -91,10 +82,12 @@ def render(
         numbers=packed(columns(evidence.records, {v.claim.id: v.checks for v in ran})),
         not_run=[verdict.claim for verdict in verdicts if verdict.outcome is Outcome.NOT_RUN],
         not_drawn=[f"{figure['title']}: {figure['gap']}" for figure in apart if figure["gap"]],
-        command=f"dualball validate --full -o {directory.resolve().name}",
+        command=f"dualball validate --full -o {name}",
         errata=errata(),
         provenance=_provenance(summary),
     )
+    write_text(path := directory / results.REPORT, page)
+    return path
 
 
 def _sections(
@@ -120,7 +113,6 @@ def _sections(
 
 
 def _provenance(summary: Summary) -> dict[str, str]:
-    """By which program, when, and from which files the page was made."""
     known = summary.provenance
     versions = known.get("versions", {})
     files = sum(len(names) for steps in summary.measurements.values() for names in steps.values())
@@ -144,9 +136,7 @@ def _row(verdict: Verdict) -> dict[str, Any]:
         "verdict": verdict,
         "mark": "other" if verdict.passed and mark == "fail" else mark,
         "symbol": symbol,
-        "predicted": list(
-            dict.fromkeys(criterion.by for criterion in verdict.claim.criteria if criterion.by)
-        ),
+        "predicted": list(dict.fromkeys(each.by for each in verdict.claim.criteria if each.by)),
         "missing": [*map(str, verdict.missing[:REASONS]), *unseen],
         "checks": wording.ranked(verdict.checks)[:ROWS],
     }
@@ -154,23 +144,19 @@ def _row(verdict: Verdict) -> dict[str, Any]:
 
 def _opening_sentence(ran: Sequence[Verdict]) -> str:
     """How far the orbit of stationary states is from theory, in a sentence."""
-    checks = [
-        check
+    off = [
+        abs(check.deviation / check.scale)
         for verdict in ran
-        for check in verdict.checks
         if verdict.claim.section == "Stationary states"
+        for check in verdict.checks
+        if check.measurement.quantity == "omega_c"
+        if math.isfinite(check.predicted) and check.scale > 0
     ]
-    orbits = [
-        c
-        for c in checks
-        if c.measurement.quantity == "omega_c" and math.isfinite(c.predicted) and c.scale > 0
-    ]
-    if not orbits:
+    if not off:
         return "Its closed-form theory by Antali and Stépán is held against simulation."
     return (
         "Antali and Stépán predict its angular velocity ω_c in closed form. In stationary states "
-        f"it was measured {len(orbits)} times, and is off by "
-        f"{wording.percent(max(abs(check.deviation / check.scale) for check in orbits))} at most."
+        f"it was measured {len(off)} times, and is off by {wording.percent(max(off))} at most."
     )
 
 
@@ -182,10 +168,9 @@ def errata() -> str:
     made = re.sub(r"<h1>.*?</h1>", "", made)  # the page has a heading for it
     made = re.sub(r"(</?h)2>", r"\g<1>3>", made)
     made = re.sub(r'<a href="(?!https?:)[^"]*">(.*?)</a>', r"\1", made)
-    region = (
-        '<div class="scroll" tabindex="0" role="region" aria-label="Errata"><table class="prose">'
-    )
-    return made.replace("<table>", region).replace("</table>", "</table></div>")
+    region = '<div class="scroll" tabindex="0" role="region" aria-label="Errata">'
+    made = made.replace("<table>", f'{region}<table class="prose">')
+    return made.replace("</table>", "</table></div>")
 
 
 def columns(records: Records, checks: Mapping[str, Sequence[Check]]) -> dict[str, list[Any]]:
@@ -209,9 +194,7 @@ def columns(records: Records, checks: Mapping[str, Sequence[Check]]) -> dict[str
     return {
         "set": [m.set for _, m, _ in rows],
         "omega_0": [float(f"{m.parameters.omega_0:.6g}") for _, m, _ in rows],
-        "quantity": [
-            f"{wording.SYMBOLS[m.quantity]} {pages.readable(m.unit)}".rstrip() for _, m, _ in rows
-        ],
+        "quantity": [wording.symbol_and_unit(m) for _, m, _ in rows],
         "conditions": [wording.conditions(m.at) for _, m, _ in rows],
         "engine": [m.engine for _, m, _ in rows],
         "measured": [rounded(m, m.value) for _, m, _ in rows],

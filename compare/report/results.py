@@ -49,12 +49,8 @@ class Summary:
             "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} processors",
             "created": datetime.now(UTC).isoformat(timespec="seconds"),
         }
-        return cls(
-            level.name,
-            measured,
-            {verdict.claim.id: _outcome(verdict) for verdict in verdicts},
-            provenance,
-        )
+        outcomes = {verdict.claim.id: _outcome(verdict) for verdict in verdicts}
+        return cls(level.name, measured, outcomes, provenance)
 
 
 def load_measurements(directory: Path, level: str, files: Files) -> RecordsByEngine:
@@ -103,17 +99,11 @@ def described(verdict: Verdict) -> dict[str, Any]:
 def _outcome(verdict: Verdict) -> dict[str, Any]:
     """A verdict in numbers, without its checks, and what engines say; JSON-able."""
     about = {"id": verdict.claim.id, "verdict": verdict.outcome, "passed": verdict.passed}
-    counts = {
-        name: sum(getattr(check, name) for check in verdict.checks)
-        for name in ("agrees", "conclusive")
-    }
-    counts |= {"left_out": verdict.left_out, "planned": verdict.planned}
+    counts = {"checks": len(verdict.checks), "agrees": sum(each.agrees for each in verdict.checks)}
+    counts |= {"conclusive": verdict.told, "left_out": verdict.left_out}
+    counts |= {"planned": verdict.planned}
     power = {"resolving_power": verdict.resolving_power, "worst": verdict.worst}
-    less = {
-        "expected": verdict.claim.expected,
-        "missing": [*map(str, verdict.missing)],
-        "error": verdict.error,
-    }
+    less = {"expected": verdict.claim.expected, "missing": [*map(str, verdict.missing)]}
     about["engines"] = {
         each.engine: {
             name: getattr(each, name) for name in ("outcome", "reason", "order", "left_out")
@@ -122,7 +112,7 @@ def _outcome(verdict: Verdict) -> dict[str, Any]:
         | {"deviation_at_2ms": {"typical": each.typical, "worst": each.farthest}}
         for each in verdict.engines
     }
-    told: dict[str, Any] = plain(about | {"checks": len(verdict.checks)} | counts | power | less)
+    told: dict[str, Any] = plain(about | counts | power | less | {"error": verdict.error})
     return told
 
 
@@ -162,6 +152,5 @@ def load(directory: Path) -> Summary:
 
 
 def save(summary: Summary, directory: Path) -> None:
-    """Write the summary, whole or not at all."""
     content = {"schema": SCHEMA, "schema_version": SCHEMA_VERSION, **vars(summary)}
     write_text(directory / SUMMARY, json.dumps(content, ensure_ascii=False, allow_nan=False))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from statistics import median
 from typing import Any
@@ -13,8 +13,9 @@ from compare.figures.pages import readable
 from compare.method.conditions import UNITS, Conditions
 from compare.method.quantities import QUANTITIES, quantity
 from compare.method.record import Check, Measurement
-from compare.verification.claim import EngineVerdict, Outcome, Text, Verdict
+from compare.verification.claim import Claim, EngineVerdict, Outcome, Text, Verdict
 from model import Case
+from model.errors import few
 
 SYMBOLS = {name: each.symbol for name, each in QUANTITIES.items()} | {
     n: n for n in ("v_h", "n_x", "n_y", "n_z")
@@ -29,11 +30,17 @@ MARKS = {
     Outcome.NOT_ASKED: ("none", "–"),
 }
 """Class and sign of each outcome."""
+_OPEN = Outcome.INCONCLUSIVE, Outcome.ERROR, Outcome.NOT_RUN
 
 
 def size(value: float, sign: str = "") -> str:
     """A small number as text: two digits, or 0."""
     return f"{value:{sign}.1e}" if value else "0"
+
+
+def symbol_and_unit(m: Measurement) -> str:
+    """What was measured: "ω_c rad/s"."""
+    return f"{SYMBOLS[m.quantity]} {readable(m.unit)}".rstrip()
 
 
 def value(m: Measurement, of: float) -> str:
@@ -71,11 +78,8 @@ def budget(m: Measurement) -> str:
     shares below 1 % are left out."""
     whole = sum(u**2 for u in m.budget.values())
     shares = sorted(((u**2 / whole, cause) for cause, u in m.budget.items() if u), reverse=True)
-    return ", ".join(
-        f"{cause.replace('_', ' ')} {share:.0%}".replace("%", " %")
-        for share, cause in shares
-        if share >= 0.01
-    )
+    said = (f"{cause.replace('_', ' ')} {100 * share:.0f} %" for share, cause in shares)
+    return ", ".join(text for text, (share, _) in zip(said, shares, strict=True) if share >= 0.01)
 
 
 def mark(check: Check) -> str:
@@ -121,18 +125,15 @@ def noticed_errors(powers: Mapping[str, float]) -> str:
             alike.setdefault(f"{power:.2g}" if power < 1 else "", []).append(SYMBOLS[name])
     blind = ", ".join(alike.pop("", []))
     errors = "; ".join(f"{power} in {', '.join(names)}" for power, names in alike.items())
-    parts = [f"a relative error of {errors}"] * bool(errors) + [
-        f"none in {blind}, which are too coarse"
-    ] * bool(blind)
+    parts = [f"a relative error of {errors}"] * bool(errors)
+    parts += [f"none in {blind}, which are too coarse"] * bool(blind)
     return "; ".join(parts)
 
 
 def coarsest(said: EngineVerdict) -> float:
     """The coarsest resolving power of a quantity; nan where all are counts."""
-    return max(
-        (power for name, power in said.resolving_power.items() if quantity(name).resolution),
-        default=math.nan,
-    )
+    powers = said.resolving_power.items()
+    return max((power for name, power in powers if quantity(name).resolution), default=math.nan)
 
 
 def engine_outcome(said: EngineVerdict) -> str:
@@ -166,17 +167,14 @@ def percent(share: float) -> str:
 
 def engines(ran: Sequence[Verdict]) -> list[dict[str, Any]]:
     """What each engine says of all claims: how many came out how, its deviations."""
+    said = defaultdict[str, list[tuple[Claim, EngineVerdict]]](list)
+    for verdict in ran:
+        for each in verdict.engines:
+            said[each.engine].append((verdict.claim, each))
     rows = []
-    for name in dict.fromkeys(each.engine for verdict in ran for each in verdict.engines):
-        own = [
-            (verdict, each) for verdict in ran for each in verdict.engines if each.engine == name
-        ]
+    for name, own in said.items():
         counts = Counter(each.outcome for _, each in own)
-        refuted = {
-            v.claim.id: v.claim.expected is Outcome.REFUTED
-            for v, w in own
-            if w.outcome is Outcome.REFUTED
-        }
+        refuted = [claim for claim, each in own if each.outcome is Outcome.REFUTED]
         off = [each for _, each in own if math.isfinite(each.typical)]
         powers = [coarsest(each) for _, each in own if each.outcome is Outcome.CONFIRMED]
         known = [power for power in powers if math.isfinite(power)]
@@ -185,13 +183,11 @@ def engines(ran: Sequence[Verdict]) -> list[dict[str, Any]]:
             "title": ENGINES[name].title or name,
             "about": ENGINES[name].about,
             "asked": str(len(own) - counts[Outcome.NOT_ASKED]),
-            "confirmed": f"{counts[Outcome.CONFIRMED]}",
+            "confirmed": str(counts[Outcome.CONFIRMED]),
             "counted": str(len(powers) - len(known)),
             "to": f"{median(known):.1e}, at worst {max(known):.1e}" if known else "–",
-            "refuted": refuted,
-            "open": str(
-                counts[Outcome.INCONCLUSIVE] + counts[Outcome.ERROR] + counts[Outcome.NOT_RUN]
-            ),
+            "refuted": {claim.id: claim.expected is Outcome.REFUTED for claim in refuted},
+            "open": str(sum(counts[each] for each in _OPEN)),
             "typical": percent(median(each.typical for each in off)) if off else "–",
             "worst": percent(max(each.farthest for each in off)) if off else "–",
         }
@@ -245,8 +241,7 @@ def headline(ran: Sequence[Verdict]) -> str:
         ("did not come out as expected", failed),
         ("can't be told from what was measured", inconclusive),
     ):
-        more = f" and {len(ids) - 4} more" if len(ids) > 4 else ""
-        parts += [f"{len(ids)} of {len(ran)} claims {what}: {', '.join(ids[:4])}{more}"] * bool(ids)
+        parts += [f"{len(ids)} of {len(ran)} claims {what}: {few(ids, 4)}"] * bool(ids)
     if parts:
         return "; ".join(parts)
     if not ran:
@@ -281,16 +276,9 @@ def coarse_and_missing(ran: Sequence[Verdict]) -> str:
 def totals(ran: Sequence[Verdict]) -> list[tuple[str, str]]:
     """Counts of claims and of numbers by outcome, each with what it counts, in words."""
     checks = [check for verdict in ran for check in verdict.checks]
-    counts = [
-        *by_kind(ran),
-        (f"{sum(check.agrees for check in checks)}/{len(checks)}", "numbers within tolerance"),
-    ]
+    within = f"{sum(check.agrees for check in checks)}/{len(checks)}"
+    counts = [*by_kind(ran), (within, "numbers within tolerance")]
     if corrected := sum(v.passed and v.claim.text is Text.CORRECTED for v in ran):
-        counts.append(
-            (
-                str(corrected),
-                f"claim{'s hold' if corrected > 1 else ' holds'} in a corrected form, see the "
-                f"errata",
-            )
-        )
+        hold = "claims hold" if corrected > 1 else "claim holds"
+        counts.append((str(corrected), f"{hold} in a corrected form, see the errata"))
     return counts

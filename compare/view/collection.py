@@ -11,6 +11,7 @@ import dataclasses
 import hashlib
 import json
 import math
+from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
@@ -44,8 +45,6 @@ NAMED = 5
 """Most files that can't be gathered, and most runs of a file, that are named one by one."""
 DOUBTED = 16
 """Most runs of a figure that are asked whether the model holds for them."""
-SHARE = 16
-"""Files that a process gathers at a time."""
 Columns = dict[str, npt.NDArray[Any]]
 """By name, an entry a run. Beside those of a collection: whether the flow is `steady`, a digest of
 all that determines the run, its `identity`, and one of its `numbers`."""
@@ -71,15 +70,17 @@ def collect(
         why = "it is no directory" if directory.exists() else "there is no such directory"
         raise StorageError(f"cannot read {directory}: {why}")
     files = list(_files(directory, output))
-    shares = [files[k : k + SHARE] for k in range(0, len(files), SHARE)]
-    parts, problems = [], list[str]()
+    parts, problems = list[Columns](), list[str]()
     with processes(workers) as work:
-        gathered = work.map(partial(_columns_of_files, directory), shares)
-        for k, (found, unread) in enumerate(gathered, 1):
-            progress(k / len(shares))
-            parts.append(found)
-            problems += unread
-    table = _one_below_the_other(parts)
+        for k, found in enumerate(work.map(partial(_rows_or_why_not, directory), files), 1):
+            progress(k / len(files))
+            if isinstance(found, str):
+                problems.append(found)
+            elif found:
+                parts.append(found)
+    # one by one, for memory's sake
+    names = list(parts[0]) if parts else []
+    table = {name: np.concatenate([part.pop(name) for part in parts]) for name in names}
     rows, twofold = _each_once(table, directory)
     problems += twofold
     if problems:
@@ -141,22 +142,12 @@ def _write(collected: Columns, output: Path) -> None:
                 stored.attrs["coordinates"] = " ".join(coordinates)  # of the CF convention
 
 
-def _columns_of_files(directory: Path, files: Sequence[Path]) -> tuple[Columns, list[str]]:
-    """The columns of all runs of some files, named by paths; and errors of others."""
-    parts, problems = [], []
-    for file in files:
-        try:
-            parts.append(_rows(file, file.relative_to(directory)))
-        except StorageError as error:
-            problems.append(str(error))
-    return _one_below_the_other(parts), problems
-
-
-def _one_below_the_other(parts: Sequence[Columns]) -> Columns:
-    """The rows of all parts in one; the parts are emptied, for memory's sake."""
-    full = [part for part in parts if part]
-    names = list(full[0]) if full else []
-    return {name: np.concatenate([part.pop(name) for part in full]) for name in names}
+def _rows_or_why_not(directory: Path, file: Path) -> Columns | str:
+    """The columns of all runs of a file, named by its path; or why it can't be read."""
+    try:
+        return _rows(file, file.relative_to(directory))
+    except StorageError as error:
+        return str(error)
 
 
 def _rows(path: Path, shown: Path) -> Columns:
@@ -264,7 +255,6 @@ def _attributes() -> dict[str, dict[str, Any]]:
 
 
 def varied_parameters(of: Mapping[str, npt.NDArray[Any]]) -> list[str]:
-    """Names of parameters with several values."""
     return [f.name for f in dataclasses.fields(Parameters) if len(np.unique(of[f.name])) > 1]
 
 
@@ -309,20 +299,19 @@ def draw(of: Columns) -> Figure:
     about = {f.name: f.metadata for f in Parameters.quantities()}[name]
     unit = pages.readable(about["unit"])
     x, label = of[name], about["symbol"] + f" ({unit})" * bool(unit)
-    figure, axes = style.panels(7, 4.6, 1)
-    axes = np.ravel(axes)[0]
+    figure = style.figure(7, 4.6)
+    axes = figure.add_subplot()
     axes.plot(x, of["omega_c_theory"], "x", color="0.6", label="theory")
     off = steady.share(of["omega_c"], of["omega_c_uncertainty"], of["omega_0"]) > steady.DRIFT
     for case in Case:
-        of_case = of["case"] == case
-        if of_case.any():
-            axes.errorbar(
-                x[of_case], of["omega_c"][of_case], of["omega_c_uncertainty"][of_case],
-                fmt="o", ms=4, color=style.COLOURS[case], label=case.name,
-            )  # fmt: skip
+        own = of["case"] == case
+        if own.any():
+            look: dict[str, Any] = {"color": style.COLOURS[case], "label": case.name}
+            y, bars = of["omega_c"][own], of["omega_c_uncertainty"][own]
+            axes.errorbar(x[own], y, bars, fmt="o", ms=4, **look)
     if off.any():
-        ring = {"ms": 8, "mfc": "none", "color": "black", "label": f"not settled: {off.sum()}"}
-        axes.plot(x[off], of["omega_c"][off], "o", **ring)
+        ring = f"not settled: {off.sum()}"
+        axes.plot(x[off], of["omega_c"][off], "o", ms=8, mfc="none", color="black", label=ring)
     axes.set(xlabel=label, ylabel=f"{style.symbol('omega_c')} (rad/s)")
     axes.grid(alpha=0.3)
     style.legend(axes)
@@ -332,7 +321,6 @@ def draw(of: Columns) -> Figure:
 
 
 def _parameters(of: Columns, k: int) -> Parameters:
-    """The parameters of the k-th run."""
     names = (f.name for f in dataclasses.fields(Parameters))
     return Parameters(**{name: of[name][k : k + 1].tolist()[0] for name in names})
 
@@ -340,20 +328,14 @@ def _parameters(of: Columns, k: int) -> Parameters:
 def describe(of: Columns) -> dict[str, Any]:
     """What a collection or batch holds: names of runs, engines, failures, the range of every
     column, JSON-able."""
-    codes, counts = np.unique(of["case"], return_counts=True)
-    finite = {
-        name: values[np.isfinite(values)] for name, values in of.items() if values.dtype.kind == "f"
-    }
+    counts, floats = Counter(of["case"].tolist()), [n for n in of if of[n].dtype.kind == "f"]
+    finite = {name: of[name][np.isfinite(of[name])] for name in floats}
     off = steady.share(of["omega_c"], of["omega_c_uncertainty"], of["omega_0"])
     return {
         "runs": len(of["run"]),
         "names": of["run"].tolist(),
         "engines": sorted(set(of["engine"].tolist())),
-        "cases": {
-            Case(code).name: int(count)
-            for code, count in zip(codes, counts, strict=True)
-            if code >= 0
-        },
+        "cases": {case.name: counts[case] for case in Case if counts[case]},
         "unsettled": int((off > steady.DRIFT).sum()),
         "drift": float(np.nanmax(off, initial=0.0)),
         "failures": [text for text in of["failure"].tolist() if text],

@@ -14,7 +14,6 @@ import json
 import signal
 import socket
 import tempfile
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -30,15 +29,18 @@ import analytic
 from analytic.bifurcation import diagram as bifurcation
 from analytic.bifurcation.diagram import Exists
 from analytic.flowmeter import real_fluid
+from analytic.flowmeter.design import THRESHOLDS
 from compare.campaign import compiling
 from compare.campaign.stops import SIGNALS
 from compare.figures.branches import slipping_curve, stable_ends
 from compare.figures.pages import typeset
 from compare.figures.style import COLOURS
 from compare.figures.validity import model_warning, torque_left_out
+from compare.method.quantities import QUANTITIES
 from compare.subjects.thresholds.figures import TINTS
 from compare.view import cases, steady
 from compare.view import page as motion
+from compare.view.guard import OwnOrigin
 from model import Case, InputError, Parameters, SimulationError, State, Trajectory, drag, storage
 from model.parameters import REACH, parse_number
 
@@ -49,8 +51,6 @@ REST, RECONNECT = 0.3, 3600.0
 """How long nothing is moved before the motion is simulated anew, s, and a tab is kept that doesn't
 answer: a browser that is busy for seconds, as with 3-D without a graphics card, would begin with
 the first set again."""
-FETCHED = 60.0
-"""How long a page is kept that no browser connects to, s."""
 OIL = 1e-5
 """Viscosity of the fluid, m2 s-1, for laws of drag that need one where the set has none."""
 UNSAID = Parameters.named("reference")
@@ -64,7 +64,6 @@ SLIDERS: dict[str, tuple[str, float, float, float]] = {
     "omega_0": ("fluid ω₀, rad/s", 0.0, 80.0, 0.1),
 }
 """Text, range and step of each."""
-SYMBOLS = {"omega_01": "ω₀₁", "omega_02": "ω₀₂", "omega_03": "ω₀₃", "omega_04": "ω₀₄"}
 LIMITS = (
     "The model is the paper's: a rigid ball with Coulomb's friction in a fluid that turns like a "
     "rigid body. Left out are rolling resistance, the fluid's inertia and its torque on the "
@@ -139,44 +138,30 @@ def characteristic(p: Parameters, start: float, fastest: float) -> Figure:
         # on one line their colours take turns
         for case, dash in ((Case.SR, "solid"), (Case.NR, "12px,12px")):
             lines.append((case.name, case, [rides, fastest], [rides, fastest], dash))
-    data = [
+    curves = [
         {"type": "scatter", "mode": "lines", "name": text, "x": np.asarray(x).tolist(),
          "y": [None if np.isnan(v) else v for v in np.asarray(y, float).tolist()],
          "line": {"color": COLOURS[case], "dash": dash, "width": 3}}
         for text, case, x, y, dash in lines
     ]  # fmt: skip
-    data.append(_cross(p.omega_0, start))
-    guides = [(name, getattr(t, name)) for name in ("omega_01", "omega_02", "omega_03", "omega_04")]
-    shown = [
-        (name, at) for name, at in guides if at < fastest and not (name == "omega_03" and folds)
-    ]
-    dotted = {"color": "#999", "dash": "dot"}
-    guide = {"type": "line", "yref": "paper", "y0": 0, "y1": 1, "line": dotted}
-    shapes = [guide | {"x0": at, "x1": at} for _, at in shown]
-    label = {
-        "yref": "paper",
-        "y": 0.98,
-        "xanchor": "left",
-        "showarrow": False,
-        "font": {"size": 11},
+    known = [name for name in THRESHOLDS if not (folds and name == "omega_03")]
+    shown = [(QUANTITIES[name].symbol, getattr(t, name)) for name in known]
+    shown = [(symbol, at) for symbol, at in shown if at < fastest]
+    guide = {"type": "line", "yref": "paper", "y0": 0, "y1": 1}
+    guide["line"] = {"color": "#999", "dash": "dot"}
+    label = {"yref": "paper", "y": 0.98, "xanchor": "left", "showarrow": False}
+    label["font"] = {"size": 11}
+    guides = {
+        "shapes": [guide | {"x0": at, "x1": at} for _, at in shown],
+        "annotations": [label | {"x": at, "text": symbol} for symbol, at in shown],
     }
-    annotations = [label | {"x": at, "text": str(typeset(SYMBOLS[name]))} for name, at in shown]
     cells = np.linspace(0.0, fastest, 81).tolist()
-    data.insert(
-        0,
-        {
-            "type": "heatmap",
-            "x": cells,
-            "y": cells,
-            "z": _as_bytes(np.zeros((81, 81))),
-            "opacity": 0.0,
-            "showscale": False,
-            "hoverinfo": "none",
-        },
-    )
-    return _figure(
-        data, "ω₀ (rad/s)", "ω_c (rad/s)", fastest, fastest, shapes=shapes, annotations=annotations
-    )
+    clicked = {
+        "type": "heatmap", "x": cells, "y": cells, "z": _as_bytes(np.zeros((81, 81))),
+        "opacity": 0.0, "showscale": False, "hoverinfo": "none",
+    }  # fmt: skip
+    data = [clicked, *curves, _cross(p.omega_0, start)]
+    return _figure(data, "ω₀ (rad/s)", "ω_c (rad/s)", fastest, fastest, **guides)
 
 
 def regions(p: Parameters, fastest: float) -> Figure:
@@ -203,14 +188,8 @@ def regions(p: Parameters, fastest: float) -> Figure:
         "colorscale": colours, "zmin": -0.5, "zmax": len(kinds) - 0.5, "showscale": False,
         "hovertemplate": "η %{x:.2f}, ω₀ %{y:.1f} rad/s<extra></extra>",
     }  # fmt: skip
-    return _figure(
-        [heat, _cross(p.eta, p.omega_0)],
-        "friction of the wall η",
-        "ω₀ (rad/s)",
-        eta[-1],
-        fastest,
-        annotations=names_at,
-    )
+    data, across = [heat, _cross(p.eta, p.omega_0)], "friction of the wall η"
+    return _figure(data, across, "ω₀ (rad/s)", eta[-1], fastest, annotations=names_at)
 
 
 def _as_bytes(cells: npt.NDArray[Any]) -> dict[str, str]:
@@ -225,13 +204,11 @@ def _as_bytes(cells: npt.NDArray[Any]) -> dict[str, str]:
 
 
 def _cross(x: float, y: float) -> Figure:
-    """A black cross at a point, as data of plotly."""
-    look = {
+    return {
+        "type": "scatter", "mode": "markers", "name": "here", "x": [x], "y": [y],
         "marker": {"symbol": "cross", "size": 12, "color": "black"},
-        "showlegend": False,
-        "cliponaxis": False,
-    }
-    return {"type": "scatter", "mode": "markers", "name": "here", "x": [x], "y": [y], **look}
+        "showlegend": False, "cliponaxis": False,
+    }  # fmt: skip
 
 
 def _figure(data: list[Figure], x: str, y: str, right: float, top: float, **more: Any) -> Figure:
@@ -258,11 +235,8 @@ def in_words(p: Parameters) -> str:
     """Whether the model holds, thresholds of a set, and the motions to which its ball settles, in a
     line."""
     t = bifurcation.thresholds(p)
-    parts = [
-        f"{symbol} = {at:.4g}"
-        for name, symbol in SYMBOLS.items()
-        if np.isfinite(at := getattr(t, name))
-    ]
+    known = [(name, getattr(t, name)) for name in THRESHOLDS]
+    parts = [f"{QUANTITIES[name].symbol} = {at:.4g}" for name, at in known if np.isfinite(at)]
     stable = " or ".join(
         f"{each.case.name} at ω_c = {float(each.state.omega_c):.4g}"
         for each in analytic.stable_solutions(p)
@@ -279,12 +253,10 @@ def serve(p: Parameters, port: int, show: bool) -> None:
     Raises `InputError` if NiceGUI, an extra, isn't installed, or the port is in use.
     """
     try:
-        from nicegui import Client, app, ui
+        from nicegui import app, ui
         from starlette.middleware.trustedhost import TrustedHostMiddleware
         from starlette.responses import HTMLResponse
         from uvicorn import server
-
-        from compare.view import guard
     except ImportError as error:
         raise InputError("explore needs NiceGUI: pip install 'nicegui>=3.18'") from error
     with socket.socket() as tried:
@@ -298,28 +270,14 @@ def serve(p: Parameters, port: int, show: bool) -> None:
             raise InputError(f"port {port} {why}; choose another one by --port") from error
     scene = motion.write(p, 1.0)
     app.add_route("/motion", lambda _: HTMLResponse(scene))
-    connected = set[str]()
-    app.on_connect(lambda client: connected.add(client.id))
-
-    def forget() -> None:
-        """Delete tabs that nobody looks at: of a page that was fetched and never opened."""
-        for client in [*Client.instances.values()]:
-            if client.id not in connected and time.time() - client.created > FETCHED:
-                client.delete()
-
-    app.timer(FETCHED / 6, forget)
-    app.add_middleware(guard.OwnOrigin)
+    app.add_middleware(OwnOrigin)
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=[HOST, "localhost"])
     print(f"http://{HOST}:{port} (Ctrl-C ends it)", flush=True)
     server.HANDLED_SIGNALS = tuple(
         each for each in SIGNALS if signal.getsignal(each) is not signal.SIG_IGN
     )
-    quiet: dict[str, Any] = {
-        "reload": False,
-        "show_welcome_message": False,
-        "reconnect_timeout": RECONNECT,
-        "http": guard.Prompt,
-    }
+    quiet: dict[str, Any] = {"reload": False, "show_welcome_message": False}
+    quiet["reconnect_timeout"] = RECONNECT
     ui.run(partial(page, p), host=HOST, port=port, title="dualball", show=show, **quiet)
 
 
@@ -354,7 +312,6 @@ def page(p: Parameters) -> None:
 
 
 def _heading(ui: Any) -> None:
-    """Say what the page shows, and what its letters mean."""
     ui.html("<h1>A ball that a fluid takes round in a vessel</h1>", sanitize=False).classes("title")
     about = (
         "It touches the floor and the wall. A case has a letter for each: R rolls, S slips, N does "
@@ -366,7 +323,6 @@ def _heading(ui: Any) -> None:
 
 
 def _cases(ui: Any) -> None:
-    """Show all cases by picture and in words."""
     with (
         ui.expansion("The nine cases: floor below, wall right", value=True).classes("w-full cases"),
         ui.row(),

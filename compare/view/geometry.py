@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,8 +17,6 @@ from model.trajectory import columns
 
 STEP = 5e-3
 """Longest time between points of the rotation, s."""
-AT_ONCE = 100_000
-"""Points of it at a time, so that a run may be longer than memory."""
 ARROW = 3.0
 """Length of the arrows of a force m g and of the fastest slip of the run, in radii of the ball."""
 
@@ -29,7 +26,7 @@ class Geometry:
     """What is seen at n times; of floor and wall, in this order, arrays (2, n, 3)."""
 
     turns: Rotation
-    """How the ball is turned, (n,)."""
+    """How the ball is turned, (n,); upright at first."""
     centres: Array
     """(n, 3), m."""
     contacts: Array
@@ -40,9 +37,8 @@ class Geometry:
     """Velocities in the tangent plane, as arrows, m; none without a force."""
 
 
-def geometry(run: Trajectory, now: Trajectory, tell: Callable[[float], object] = float) -> Geometry:
-    """Positions of ball, contacts and arrows at the samples of `now`, which is `run` resampled;
-    `tell` is called with the fraction done."""
+def geometry(run: Trajectory, now: Trajectory) -> Geometry:
+    """Positions of ball, contacts and arrows at the samples of `now`, which is `run` resampled."""
     p = run.header.parameters
     centres, axes = to_world(now.x, now.theta, p).position, frame(now.theta)
     normals = np.stack([axes[:, 1], axes[:, 0]])
@@ -56,7 +52,7 @@ def geometry(run: Trajectory, now: Trajectory, tell: Callable[[float], object] =
         ARROW * p.r / fastest if fastest > 0 else 0.0
     )
     return Geometry(
-        turns=orientations(run, now.time, tell),
+        turns=_orientations(run, now.time),
         centres=centres,
         contacts=centres - p.r * normals,
         forces=forces * (ARROW * p.r / (p.m * p.g)),
@@ -81,26 +77,19 @@ def resampled(run: Trajectory, times: Array) -> Trajectory:
     return dataclasses.replace(run, **values, case=run.case[before])
 
 
-def orientations(run: Trajectory, times: Array, tell: Callable[[float], object]) -> Rotation:
-    """The ball's orientation at times (n,) in s, from its angular velocity in the middle of short
-    steps; upright at first. `tell` is called with the fraction done."""
-    steps = max(1, math.ceil((times[-1] - run.time[0]) / STEP))
-    points = np.linspace(run.time[0], times[-1], steps + 1)
-    wanted = np.searchsorted(points, times).clip(max=steps)
-    turned = np.array([[0.0, 0.0, 0.0, 1.0]])
-    found = [turned.repeat(np.sum(wanted == 0), axis=0)]
-    for first in range(0, steps, AT_ONCE):
-        part = points[first : first + AT_ONCE + 1]
-        middle = resampled(run, (part[1:] + part[:-1]) / 2)
-        spin = to_world(middle.x, middle.theta, run.header.parameters).spin
-        each = Rotation.from_rotvec(spin * np.diff(part)[:, None]).as_quat()
-        turned, summed = np.vstack([turned[-1:], each]), 1
-        while summed < len(turned):  # each holds the product of so many steps up to its own
-            later = _product(turned[summed:], turned[:-summed])
-            turned, summed = np.vstack([turned[:summed], later]), 2 * summed
-        found.append(turned[wanted[(wanted > first) & (wanted < first + len(turned))] - first])
-        tell((first + len(each)) / steps)
-    return Rotation.from_quat(np.vstack(found))
+def _orientations(run: Trajectory, times: Array) -> Rotation:
+    """How the ball is turned since the first of times (n,) in s, from its angular velocity in the
+    middle of short steps."""
+    steps = max(1, math.ceil((times[-1] - times[0]) / STEP))
+    points = np.linspace(times[0], times[-1], steps + 1)
+    middle = resampled(run, (points[1:] + points[:-1]) / 2)
+    spin = to_world(middle.x, middle.theta, run.header.parameters).spin
+    each = Rotation.from_rotvec(spin * np.diff(points)[:, None]).as_quat()
+    turned, summed = np.vstack([[0.0, 0.0, 0.0, 1.0], each]), 1
+    while summed < len(turned):  # each holds the product of so many steps up to its own
+        later = _product(turned[summed:], turned[:-summed])
+        turned, summed = np.vstack([turned[:summed], later]), 2 * summed
+    return Rotation.from_quat(turned[np.searchsorted(points, times).clip(max=steps)])
 
 
 def _product(a: Array, b: Array) -> Array:

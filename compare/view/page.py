@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import base64
 import importlib.util
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ from compare.view.geometry import geometry, resampled
 from model import Case, InputError, Parameters, Trajectory
 from model.arrays import Array
 from model.files import check_writable, write_bytes
-from model.parameters import POSITIVE, Range, check_number
+from model.parameters import Range, check_number
 
 DIGITS = 4
 """Of lengths, in units of R, and of parts of quaternions."""
@@ -34,13 +33,11 @@ def save(
     time: float = 60.0,
     speed: float = 0.25,
     rate: float = 60.0,
-    tell: Callable[[float], object] = float,
 ) -> str:
     """Write the page of a run; return in words what was written.
 
     It begins at a time `at` of the run, plays at a multiple `speed` of real time with `rate` frames
-    a second, and takes `time`, less if the run ends before; all in s. `tell` is called with the
-    fraction done.
+    a second, and takes `time`, less if the run ends before; all in s.
 
     Raises `InputError` for what can't be shown, and where NiceGUI, an extra, isn't installed;
     `StorageError` if the file can't be written."""
@@ -49,8 +46,6 @@ def save(
         raise InputError("the run has no samples to show")
     begin, end = float(run.time[0]), float(run.time[-1])
     check_number("at", at, "s", Range(begin, end), "to be within the run it")
-    for name, value, unit in (("time", time, "s"), ("speed", speed, "1"), ("rate", rate, "s-1")):
-        check_number(name, value, unit, POSITIVE)
     step, until = speed / rate, min(at + time * speed, end)
     if (until - at) / step > MOST_FRAMES:
         raise InputError(
@@ -58,17 +53,15 @@ def save(
             f"time, or a lower rate"
         )
     times = np.arange(at, until + 1e-12, step)
-    moves = frames(run, times, tell)
-    write_bytes(output, write(run.header.parameters, speed, moves, run).encode())
+    page = write(run.header.parameters, speed, frames(run, times), run)
+    write_bytes(output, page.encode())
     return f"{output}: {len(times)} frame{'s' * (len(times) != 1)}"
 
 
-def frames(
-    run: Trajectory, times: Array, tell: Callable[[float], object] = float
-) -> dict[str, Any]:
-    """What moves on the page, frame by frame, at times (n,) in s; `tell` as in `save`."""
+def frames(run: Trajectory, times: Array) -> dict[str, Any]:
+    """What moves on the page, frame by frame, at times (n,) in s."""
     p, now = run.header.parameters, resampled(run, times)
-    seen = geometry(run, now, tell)
+    seen = geometry(run, now)
     columns = [
         seen.centres / p.R, seen.turns.as_quat(),
         *(part[k] / p.R for k in range(2) for part in (seen.contacts, seen.forces, seen.slips)),
@@ -100,23 +93,27 @@ def write(
         }
         for case in Case
     }
-    about = {
-        "cases": cases,
-        "speed": speed,
-        "size": p.r / p.R,
-        "colours": {"ball": BALL, "force": FORCE, "slip": SLIP},
-    }
-    slips = run is not None and bool(np.any(run.slip_speed_A + run.slip_speed_B))
-    told = {"p": p, "header": run and run.header, "force": FORCE, "slip": SLIP, "slips": slips}
+    colours = {"ball": BALL, "force": FORCE, "slip": SLIP}
+    return render(
+        "compare.view",
+        "motion.html",
+        three=_three(),
+        about={"cases": cases, "speed": speed, "size": p.r / p.R, "colours": colours},
+        motion=motion,
+        p=p,
+        header=run and run.header,
+        slips=run is None or bool(np.any(run.slip_speed_A + run.slip_speed_B)),
+    )
+
+
+def _three() -> str:
+    """The address of three.js with its controls: a module, which NiceGUI brings along."""
     nicegui = importlib.util.find_spec("nicegui")
     if nicegui is None or nicegui.origin is None:
         raise InputError("a page needs NiceGUI, which has three.js: pip install 'nicegui>=3.18'")
-    try:
-        source = (Path(nicegui.origin).parent / "elements/scene/dist/index.js").read_bytes()
-    except FileNotFoundError:
+    source = Path(nicegui.origin).parent / "elements/scene/dist/index.js"
+    if not source.exists():
         raise InputError(
             "this NiceGUI has no three.js where version 3 has it: pip install 'nicegui>=3.18'"
-        ) from None
-    # with its controls, as a module
-    three = "data:text/javascript;base64," + base64.b64encode(source).decode()
-    return render("compare.view", "motion.html", three=three, about=about, motion=motion, **told)
+        )
+    return "data:text/javascript;base64," + base64.b64encode(source.read_bytes()).decode()

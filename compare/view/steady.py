@@ -88,7 +88,6 @@ def in_words(flow: Flow, lasts: float, of: Mapping[str, float] | None) -> str:
 
 
 def percent(share: float) -> str:
-    """A share in per cent as text, two digits of it."""
     return f"{float(f'{100 * share:.2g}'):g}"
 
 

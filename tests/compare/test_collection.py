@@ -147,11 +147,8 @@ def test_a_batch_is_described_like_a_collection_and_its_runs_are_named(tmp_path,
     assert [str(tmp_path / "runs" / name) for name in names] == about["names"]
 
 
-def test_means_alone_make_the_same_collection_in_any_number_of_processes(
-    tmp_path, capsys, monkeypatch
-):
+def test_means_alone_make_the_same_collection_in_any_number_of_processes(tmp_path, capsys):
     """In less than a third of the space; what is done is not done again."""
-    monkeypatch.setattr(collection, "SHARE", 1)
     sweep = (
         "sweep --vary omega_0=5:10:6 --vary eta=0.1,0.3 --time 0.2 --batch 4 --workers 0 --quiet"
     )

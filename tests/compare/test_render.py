@@ -86,16 +86,6 @@ def test_a_ball_that_rolls_turns_about_its_contacts():
     assert np.abs(moved).max() < 0.1 * np.abs(np.diff(seen.centres, axis=0)).max()
 
 
-def test_a_long_run_turns_part_by_part_and_says_how_far_it_is(run, monkeypatch):
-    whole, told = geometry.geometry(run, run).turns, list[float]()
-    monkeypatch.setattr(geometry, "AT_ONCE", 7)
-    parts = geometry.geometry(run, run, told.append).turns
-    assert np.abs((parts * whole.inv()).magnitude()).max() < 1e-12
-    assert told == sorted(told)
-    assert len(told) > 20
-    assert told[-1] == 1
-
-
 def test_a_run_is_shown_between_its_samples(run):
     k = int(np.flatnonzero(np.diff(run.case))[0])
     between = geometry.resampled(run, np.array([0.6 * run.time[k] + 0.4 * run.time[k + 1], 0.8]))
@@ -115,7 +105,6 @@ def test_a_run_is_shown_between_its_samples(run):
             {"at": 9.0},
             r"at = 9 s is out of range: to be within the run it must be >= 0 and <= 0\.8$",
         ),
-        ("p.html", {"speed": 0.0}, "speed = 0 is out of range"),
         (
             "p.html",
             {"speed": 0.05, "rate": 1000},
@@ -296,15 +285,6 @@ def test_pages_of_other_sites_are_not_answered(address, path):
     with pytest.raises(urllib.error.HTTPError, match="403") as refusal:
         urllib.request.urlopen(urllib.request.Request(url, headers=upgrade), timeout=10)
     refusal.value.close()
-
-
-@pytest.mark.slow
-def test_who_is_slow_with_headers_is_not_waited_for(address):
-    guard = pytest.importorskip("compare.view.guard")
-    port = int(address.strip("/").rsplit(":", 1)[1])
-    with socket.create_connection(("127.0.0.1", port), timeout=3 * guard.HEADERS) as slow:
-        slow.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n")
-        assert slow.recv(100) == b""  # closed
 
 
 def test_without_the_extra_it_is_named(monkeypatch):

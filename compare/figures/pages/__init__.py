@@ -112,6 +112,11 @@ def render(package: str, template: str, **values: Any) -> str:
     return environment.get_template(template).render(**values)
 
 
+def by_heading(rows: Sequence[Mapping[str, str]]) -> Rows:
+    """A table from its rows, each with a cell by heading."""
+    return [[*rows[0]], *([*row.values()] for row in rows)]
+
+
 def markdown(rows: Rows) -> str:
     """A table in Markdown; columns of short cells, most of them numbers, to the right."""
     short = [all(len(cell) <= 9 for cell in column[1:]) for column in zip(*rows, strict=True)]
