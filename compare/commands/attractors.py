@@ -28,9 +28,10 @@ from model.files import write_text
 from model.kinematics import UNITS, VARIABLES
 from model.parameters import Range, check_number
 
+_FOUND = "attractors", "branches"
+
 
 def run(args: argparse.Namespace) -> int:
-    """Find the attractors of every set of parameters, and show them."""
     axes, ways = map(Axis.several, (args.vary, args.follow))
     ranges = {way.name: way.ends for way in ways}
     sets = list(grid(options.parameters(args), axes))
@@ -41,12 +42,9 @@ def run(args: argparse.Namespace) -> int:
             args.tell((k + done) / len(sets))
 
         found = _attractors(args, p, tell)
-        branches = [
-            orbit_branch.follow(each.limit.orbit, name, *ends)
-            for each in found
-            if each.limit.orbit
-            for name, ends in ranges.items()
-        ]
+        orbits = [each.limit.orbit for each in found if each.limit.orbit]
+        follow = orbit_branch.follow
+        branches = [follow(orbit, name, *ends) for orbit in orbits for name, ends in ranges.items()]
         varied: dict[str, Any] = {axis.name: getattr(p, axis.name) for axis in axes}
         attracting, born = list(map(attractor_data, found)), list(map(branch_data, branches))
         rows.append(varied | {"attractors": attracting, "branches": born})
@@ -60,13 +58,10 @@ def run(args: argparse.Namespace) -> int:
     for branch in _branches(data):
         name = branch["parameter"]
         values = [orbit[name] for orbit in branch["orbits"]]
-        lines.append(
-            f"Followed in {name}, {len(values)} orbits from {min(values):.6g} to {max(values):.6g}:"
-        )
-        lines += [
-            f"  {place['kind']} at {place['value']:.7g} {place['reason']}"
-            for place in branch["places"]
-        ]
+        span = f"{len(values)} orbits from {min(values):.6g} to {max(values):.6g}"
+        lines.append(f"Followed in {name}, {span}:")
+        for at in branch["places"]:
+            lines.append(f"  {at['kind']} at {at['value']:.7g} {at['reason']}")
     options.show(data, args.json, pages.table(title, table, caption="\n".join(lines)))
     return 0
 
@@ -91,7 +86,6 @@ def _attractors(
 
 
 def _branches(data: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """The branches of orbits of all sets."""
     return itertools.chain.from_iterable(each["branches"] for each in data["sets"])
 
 
@@ -148,49 +142,34 @@ def branch_data(branch: orbit_branch.OrbitBranch) -> dict[str, Any]:
 
 
 def _table(data: dict[str, Any]) -> pages.Rows:
-    """A table with a row for each attractor of each set."""
-    varied = [name for name in data["sets"][0] if name not in ("attractors", "branches")]
-    head = (
-        "motion",
-        "cases",
-        "starts (95 %)",
-        "period (s)",
-        "ω_c (rad/s)",
-        "y max (mm)",
-        "|multiplier|",
-        "theory",
-    )
-    rows = [[*varied, *head]]
+    rows: list[dict[str, str]] = []
     for each in data["sets"]:
+        varied = {name: f"{each[name]:.6g}" for name in each if name not in _FOUND}
         for row in each["attractors"]:
             low, high = row["share_95"]
-            exponent = (
-                f"exponent {row['lyapunov']:.2g}/s" if row["lyapunov"] is not None else "none"
-            )
-            cells = [
-                row["kind"],
-                " ".join(row["cases"]),
-                f"{row['count']}/{row['starts']} ({low:.2f}–{high:.2f})",
-                f"{row['period']:.6g}" if row["period"] else "-",
-                f"{row['mean']['omega_c']:.6g} "
-                f"({row['low']['omega_c']:.5g}–{row['high']['omega_c']:.5g})",
-                f"{1e3 * row['high']['y']:.4g}",
-                f"{_largest(row):.4g}" if row["multipliers"] else "-",
-                row["theory"] or row["failure"] or exponent,
-            ]
-            rows.append([*(f"{each[name]:.6g}" for name in varied), *cells])
-    return rows
+            mean, least, most = (row[name]["omega_c"] for name in ("mean", "low", "high"))
+            exponent = "none" if row["lyapunov"] is None else f"exponent {row['lyapunov']:.2g}/s"
+            cells = {
+                "motion": row["kind"],
+                "cases": " ".join(row["cases"]),
+                "starts (95 %)": f"{row['count']}/{row['starts']} ({low:.2f}–{high:.2f})",
+                "period (s)": f"{row['period']:.6g}" if row["period"] else "-",
+                "ω_c (rad/s)": f"{mean:.6g} ({least:.5g}–{most:.5g})",
+                "y max (mm)": f"{1e3 * row['high']['y']:.4g}",
+                "|multiplier|": f"{_largest(row):.4g}" if row["multipliers"] else "-",
+                "theory": row["theory"] or row["failure"] or exponent,
+            }
+            rows.append(varied | cells)
+    return pages.by_heading(rows)
 
 
 def _page(
     title: str, words: Sequence[str], p: Parameters, data: dict[str, Any], table: pages.Rows
 ) -> str:
-    """The table in Markdown, with parameters, command, and the orbits of each branch."""
     symbols = {f.name: f.metadata["symbol"] for f in p.quantities()}
     units = {f.name: pages.readable(f.metadata["unit"]) for f in p.quantities()}
-    given = ", ".join(
-        f"{symbols[name]} = {getattr(p, name):.5g} {unit}".rstrip() for name, unit in units.items()
-    )
+    values = {symbols[name]: f"{getattr(p, name):.5g} {unit}" for name, unit in units.items()}
+    given = ", ".join(f"{symbol} = {value}".rstrip() for symbol, value in values.items())
     lines = [f"# {title}: what balls come to", ""]
     lines += [f"Parameters, unless a table says otherwise: {given}; drag: {p.drag}. Written by", ""]
     lines += ["```sh", shlex.join(words), "```", "", pages.markdown(table)]
@@ -198,10 +177,8 @@ def _page(
         name = branch["parameter"]
         symbol = symbols[name]
         lines += ["", f"## Followed in {symbol}", ""]
-        lines += [
-            f"* {place['kind']} at {symbol} = {place['value']:.6g} {place['reason']}".rstrip()
-            for place in branch["places"]
-        ]
+        for at in branch["places"]:
+            lines.append(f"* {at['kind']} at {symbol} = {at['value']:.6g} {at['reason']}".rstrip())
         head = "period (s)", "mean ω_c (rad/s)", "height (mm)", "largest |multiplier|", "stable"
         rows = [[symbol, *head]]
         for orbit in branch["orbits"]:
@@ -218,7 +195,6 @@ def _largest(row: dict[str, Any]) -> float:
 
 
 def run_basins(args: argparse.Namespace) -> int:
-    """Map the basins of attraction over a plane of starts, and show their shares."""
     p, start = options.parameters(args), running.start(args)
     units = dict(zip(VARIABLES, UNITS, strict=True))
     across, up = (Axis.parse(text, units, "state variable") for text in (args.across, args.up))
@@ -235,22 +211,18 @@ def run_basins(args: argparse.Namespace) -> int:
         drawing.save(figures.draw_basins(mapped), args.map)
     elif args.map:
         mapped.save(args.map)
-    shares = {
-        attractor: mapped.share(attractor) for attractor in ATTRACTORS if mapped.share(attractor)[0]
-    }
+    shares = {name: mapped.share(name) for name in ATTRACTORS if mapped.share(name)[0]}
     differ = mapped.differences().tolist() if args.mujoco else []
     said = []
-    for attractor, (hits, of) in shares.items():
-        low, high = interval(hits, of)
+    for name, (hits, of) in shares.items():
+        share, low, high = (100 * each for each in (hits / of, *interval(hits, of)))
+        said.append(f"{name:>14}: {share:5.1f} % of {of} starts ({low:.1f} to {high:.1f} %)")
+    if args.mujoco:
         said.append(
-            f"{attractor:>14}: {100 * hits / of:5.1f} % of {of} starts ({100 * low:.1f} to "
-            f"{100 * high:.1f} %)"
+            f"MuJoCo differs at {len(differ)} of {mapped.mujoco.size} starts, so many cells from "
+            f"a boundary: {differ}; {mapped.undecided} more came to nothing"
         )
-    where = (
-        f"MuJoCo differs at {len(differ)} of {mapped.mujoco.size} starts, so many cells from a "
-        f"boundary: {differ}; {mapped.undecided} more came to nothing"
-    )
     data = {"shares": shares, "mujoco": mapped.mujoco.size}
     data |= {"differences": differ, "undecided": mapped.undecided}
-    options.show(data, args.json, *said, *([where] if args.mujoco else []))
+    options.show(data, args.json, *said)
     return 0

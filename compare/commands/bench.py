@@ -28,16 +28,14 @@ LEAGUE_JSON, LEAGUE_PAGE = "league.json", "league.html"
 
 
 def run_league(args: argparse.Namespace) -> int:
-    """Run engines on the exact cases, show the table, write JSON and page."""
     # here and below, because a list of the cases waits for no engine
     from compare.bench import league, runner
     from compare.campaign import progress
     from compare.figures.pictures import embedded, svg
 
     chosen = {name: league.ENTRIES.get(name, name) for name in args.engine or league.ENTRIES}
-    modules = {
-        name for name in chosen if re.search(r"\w[.:]\w", name) or Path(f"{name}.py").exists()
-    }
+    dotted = re.compile(r"\w[.:]\w")
+    modules = {name for name in chosen if dotted.search(name) or Path(f"{name}.py").exists()}
     check_names(chosen.keys() - modules, list(league.ENTRIES), "engine")
     for name in args.engine or ():
         runner.check(chosen[name])
@@ -46,35 +44,35 @@ def run_league(args: argparse.Namespace) -> int:
     with progress.reporter(args.quiet) as show:
         found = league.measure(chosen, league.QUICK if args.quick else None, args.workers, show)
     if all(result.skipped for results in found.values() for result in results):
-        raise InputError(
-            f"there is nothing to compare: {'; '.join(r[0].skipped for r in found.values())}"
-        )
+        why = "; ".join(results[0].skipped for results in found.values())
+        raise InputError(f"there is nothing to compare: {why}")
     data = league.to_mapping(found)
     write_text(args.output / LEAGUE_JSON, json.dumps(data, indent=1))
-    summary = league.summary(found)
-    rows = league.rows(found)
-    columns = enumerate(league.ranked(found).values(), 1)
-    shown = {
-        "summary": summary,
-        "rows": rows,
-        "failed": {
-            (r.case, k) for k, results in columns for r in results if not (r.skipped or r.passed)
-        },
-        "about": league.declarations(found),
-        "notes": list(league.notes(found)),
-        "caption": league.caption(found),
-        "least": f"{league.LEAST:g}",
-    }
-    pictures, shown["letters"] = embedded({"": svg(league.draw(found))})
-    shown["picture"] = pictures[""]
-    write_text(args.output / LEAGUE_PAGE, pages.render("compare.bench", "league.html", **shown))
-    for name, those, why in league.notes(found):
+    summary, rows, caption = league.summary(found), league.rows(found), league.caption(found)
+    notes, columns = list(league.notes(found)), enumerate(league.ranked(found).values(), 1)
+    failed = {(r.case, k) for k, own in columns for r in own if not (r.skipped or r.passed)}
+    pictures, letters = embedded({"": svg(league.draw(found))})
+    page = pages.render(
+        "compare.bench",
+        "league.html",
+        summary=summary,
+        rows=rows,
+        failed=failed,
+        about=league.declarations(found),
+        notes=notes,
+        caption=caption,
+        least=f"{league.LEAST:g}",
+        picture=pictures[""],
+        letters=letters,
+    )
+    write_text(args.output / LEAGUE_PAGE, page)
+    for name, those, why in notes:
         if not those:
             print(f"dualball: {name} is left out: {why}", file=sys.stderr)
     head = [name.replace("-", "- ") for name in rows[0]]  # which may be broken there
     tables = {"League": summary, "Errors by case": [head, *rows[1:]]}
     drawn = (pages.table(title, own, no_wrap=True, padding=0) for title, own in tables.items())
-    options.show(data, args.json, *drawn, shown["caption"])
+    options.show(data, args.json, *drawn, caption)
     if not args.json:
         print(f"page: {args.output / LEAGUE_PAGE}")
     return 0
@@ -134,7 +132,6 @@ def run_forecast(args: argparse.Namespace) -> int:
 
 
 def run_cases(args: argparse.Namespace) -> int:
-    """List the exact cases, show one, or write all."""
     # as a file has them, since the cases are simulated
     if not (args.name or args.json or args.output):
         known = json.loads(
@@ -189,21 +186,15 @@ def _told_of(case: ContactCase) -> dict[str, str]:
 
 
 def _table(version: int, rows: list[list[str]]) -> Any:
-    """The table of the exact cases for the terminal."""
     head = ["case", "contacts", "kind", "what happens"]
     return pages.table(f"Exact contact cases, version {version}", [head, *rows], justify="left")
 
 
 def _fields(item: Any) -> str:
     """The fields of a dataclass in a line, SI units."""
-    values = (
-        (field.name, value)
-        for field in dataclasses.fields(item)
-        if (value := getattr(item, field.name))
-    )
-    return ", ".join(
-        f"{name} {value if isinstance(value, str) else _numbers(value)}" for name, value in values
-    )
+    values = ((field.name, getattr(item, field.name)) for field in dataclasses.fields(item))
+    shown = ((name, v if isinstance(v, str) else _numbers(v)) for name, v in values if v)
+    return ", ".join(f"{name} {value}" for name, value in shown)
 
 
 def _numbers(values: Any) -> str:

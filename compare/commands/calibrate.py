@@ -24,7 +24,6 @@ LINES, FINE = 12, 2000
 
 
 def run(args: argparse.Namespace) -> int:
-    """Show, write and draw the calibration curve of a set."""
     if args.parameter_omega_0 is not None:
         raise InputError("--omega-0 has no effect: it is varied; see --slowest and --fastest")
     p, k = options.parameters(args), args.swirl or 1.0
@@ -53,12 +52,8 @@ def run(args: argparse.Namespace) -> int:
     at = np.unique(np.linspace(0, len(columns[FLOW]) - 1, LINES).round().astype(int))
     names = [name for name in columns if not name.startswith("K ")]
     rows = [names, *([_cell(columns[name][i]) for name in names] for i in at)]
-    options.show(
-        {"parameters": p, "swirl": args.swirl, "said": said, "curve": columns},
-        args.json,
-        *said,
-        pages.table("Calibration curve", rows),
-    )
+    data = {"parameters": p, "swirl": args.swirl, "said": said, "curve": columns}
+    options.show(data, args.json, *said, pages.table("Calibration curve", rows))
     return 0
 
 
@@ -146,15 +141,13 @@ def in_words(
         said.append(f"Beyond the range it reads up to {worst:.2g} % too low{again}.")
     elif limit.omega_0 < top:
         said.append("Beyond the range it reads right, too, but for the ball's fall.")
-    left = [
-        torque_left_out(p.replace(omega_0=min(limit.omega_0, top))),
-        meter.AT_WALLS * bool(p.nu_f),
-    ]
-    left = [each for each in left if each] or [
+    torque = torque_left_out(p.replace(omega_0=min(limit.omega_0, top)))
+    left = [each for each in (torque, meter.AT_WALLS * bool(p.nu_f)) if each]
+    unknown = (
         "Left out are a real fluid's torque on the ball and its inertia: give nu_f and "
         "density_ratio to have their share."
-    ]
-    return said + left
+    )
+    return said + (left or [unknown])
 
 
 def _cell(value: Any) -> str:

@@ -69,11 +69,8 @@ def request(asked: Mapping[str, Any]) -> Request:
         )
     common = _table(asked, "bounds", {}, texts=tuple(_BOUNDS))
     materials = asked.get("material", [{"name": "ball"}])
-    if not (
-        isinstance(materials, list)
-        and materials
-        and all(isinstance(each, Mapping) for each in materials)
-    ):
+    several = isinstance(materials, list) and all(isinstance(each, Mapping) for each in materials)
+    if not (several and materials):
         raise InputError("material must be a list of tables, each under [[material]]")
     bounds: dict[str, dict[str, Interval]] = {}
     for each in materials:

@@ -28,7 +28,6 @@ COLUMNS: dict[str, tuple[str, Sequence[str]]] = {
 
 
 def run(args: argparse.Namespace) -> int:
-    """Fit theory to the curve, say what it tells, and draw both."""
     if not (own := options.own_set(args)):
         how = "--set NAME or --parameters FILE"
         raise InputError(f"a measured curve needs its meter, {how}; motions come in two")
@@ -99,7 +98,6 @@ def in_words(found: list[Fit], best: Fit | None, name: str, flow: Array, read: A
 
 
 def _row(fit: Fit) -> list[str]:
-    """A fit as a row of the table."""
     values = [
         _with(value, fit.u[name]) if name in fit.free else f"{value:.3g} (given)"
         for name in measured.FITS[-1]

@@ -126,12 +126,10 @@ class Number:
             raise argparse.ArgumentTypeError(f"{text.strip()!r} is not a number") from error
         if not math.isfinite(number) or number not in self.allowed:
             said = f"{number:g} {readable(self.unit)}".rstrip()
-            limits = ["finite"] * (not math.isfinite(number)) + [str(self.allowed)] * (
-                self.allowed != ANY
-            )
-            raise argparse.ArgumentTypeError(
-                f"{said} is out of range: it must be {' and '.join(limits)}"
-            )
+            limits = ["finite"] * (not math.isfinite(number))
+            limits += [str(self.allowed)] * (self.allowed != ANY)
+            must = f"it must be {' and '.join(limits)}"
+            raise argparse.ArgumentTypeError(f"{said} is out of range: {must}")
         return int(number) if self.allowed.whole else number
 
     @property
@@ -189,7 +187,6 @@ ENDINGS = {suffix for each in (HDF5, TABLE, MARKDOWN, PAGE, MAP) for suffix in e
 
 
 def is_table(output: Path | None) -> bool:
-    """Whether an output is a table of numbers, by the end of its name."""
     return output is not None and output.suffix.lower() in TABLE.suffixes
 
 
@@ -245,23 +242,13 @@ class Help(argparse.HelpFormatter):
 
     def _get_help_string(self, action: argparse.Action) -> str | None:
         default, text = action.default, action.help or ""
-        if (
-            default is None
-            or default is False
-            or default == []
-            or default == argparse.SUPPRESS
-            or "default" in text
-        ):
+        none = default is None or default is False or default in ([], argparse.SUPPRESS)
+        if none or "default" in text:
             return text
-        if not isinstance(default, Path):
-            default = (
-                f"{default:g}" if isinstance(default, float) else getattr(default, "name", default)
-            )
-        return f"{text} (default {default})"
+        return f"{text} (default {f'{default:g}' if isinstance(default, float) else default})"
 
 
 def warn(said: str) -> None:
-    """Say what to mind about what was asked, on standard error."""
     print(f"dualball: warning: {said}", file=sys.stderr)
 
 
@@ -359,9 +346,8 @@ def add_axes(
     parser: Parser, option: str, meaning: str, form: str = "NAME=FROM:TO:COUNT", **more: Any
 ) -> None:
     """An option for ranges or lists of values (`sweep.Axis`), to be given once or more often."""
-    parser.add_argument(
-        option, action="append", metavar=form, help=meaning, **{"default": [], **more}
-    )
+    more = {"default": []} | more
+    parser.add_argument(option, action="append", metavar=form, help=meaning, **more)
 
 
 def add_directory(parser: Parser, directory: str, *names: str) -> None:
@@ -369,20 +355,16 @@ def add_directory(parser: Parser, directory: str, *names: str) -> None:
     where = "directory of the results"
     if parser.get_default("resumes"):
         where += "; what it holds already is not computed again"
-    names = names or ("-o", "--output")
-    parser.add_argument(
-        *names, dest="output", type=results, default=Path(directory), metavar="DIR", help=where
-    )
+    look: dict[str, Any] = {"default": Path(directory), "metavar": "DIR", "help": where}
+    parser.add_argument(*names or ("-o", "--output"), dest="output", type=results, **look)
     parser.add_argument("--quiet", action="store_true", help="no progress")
 
 
 def add_json(parser: Parser, shown: str = "print JSON") -> None:
-    """The option --json, to print results for programs."""
     parser.add_argument("--json", action="store_true", help=shown)
 
 
 def add_engine(parser: Parser, default: str = "mujoco") -> None:
-    """Options that choose an engine and its accuracy."""
     group = parser.add_argument_group("engine")
     add_engine_name(group, default, f"default {default}")
     group.add_argument(
@@ -425,13 +407,11 @@ def add_processes(parser: Any) -> None:
 
 
 def add_samples(parser: Parser) -> None:
-    """The option that says how often a run is sampled."""
     between = "time between samples (default: duration/1000)"
     parser.add_argument("--sample-interval", type=seconds, help=between)
 
 
 def add_start(parser: Parser) -> None:
-    """The option for the initial state."""
     from model.kinematics import UNITS, VARIABLES  # here, because it loads numpy
 
     units = ", ".join(f"{name} in {unit}" for name, unit in zip(VARIABLES, UNITS, strict=True))
@@ -440,14 +420,12 @@ def add_start(parser: Parser) -> None:
 
 
 def add_plot(parser: Parser, what: str) -> None:
-    """The option --plot, to draw what is printed."""
     parser.add_argument(
         "--plot", type=FIGURE, help=f"draw {what}: png, svg or pdf (default: don't)"
     )
 
 
 def add_verdicts(parser: Parser) -> None:
-    """Options for which claims are judged, and how verdicts are shown."""
     one = "only this claim; may be repeated (default: all)"
     parser.add_argument("--claim", action="append", metavar="ID", help=one)
     parser.add_argument("--verbose", action="store_true", help="list every number of each claim")
@@ -496,6 +474,5 @@ def parameters(args: argparse.Namespace) -> Parameters:
 def given_options(
     args: argparse.Namespace, names: Iterable[str], prefix: str = ""
 ) -> dict[str, Any]:
-    """The options of these names that were given, with their values."""
     values = {name: getattr(args, prefix + name) for name in names}
     return {name: value for name, value in values.items() if value is not None}

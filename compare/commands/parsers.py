@@ -55,17 +55,11 @@ def validate(parser: Parser) -> None:
 
     The exit code is 1 if a verdict on the engine on trial isn't the expected one. What the
     engines beside it refute is told, and changes nothing."""
+    parser.set_defaults(level="default")
     level = parser.add_mutually_exclusive_group()
-    for name, takes in (("quick", "three to six minutes"), ("full", "an hour or more")):
-        takes = f"{takes} (default: in between)"
-        level.add_argument(
-            f"--{name}",
-            dest="level",
-            action="store_const",
-            const=name,
-            default="default",
-            help=takes,
-        )
+    for name, time in (("quick", "three to six minutes"), ("full", "an hour or more")):
+        takes = f"{time} (default: in between)"
+        level.add_argument(f"--{name}", dest="level", action="store_const", const=name, help=takes)
     options.add_own_set(parser)
     options.add_engine_name(parser, None, "only this one is asked; default: the first three")
     parser.add_argument("--list", action="store_true", help="list the claims and stop")
@@ -96,15 +90,9 @@ def figures(parser: Parser) -> None:
     stored = "directory of a validation (default results, if it is there)"
     parser.add_argument("--results", type=Path, metavar="DIR", help=stored)
     options.add_own_set(parser)
-    parser.add_argument(
-        "--figure", action="append", metavar="NAME", help="only this one, as fig-9; may be repeated"
-    )
-    parser.add_argument(
-        "--format",
-        action="append",
-        metavar="NAME",
-        help="svg (default), pdf or png; may be repeated",
-    )
+    one, formats = "only this one, as fig-9", "svg (default), pdf or png"
+    for name, what in (("--figure", one), ("--format", formats)):
+        parser.add_argument(name, action="append", metavar="NAME", help=f"{what}; may be repeated")
     # it shows what was measured, they what theory says of a set
     parser.excludes("--results", "--parameters", "--set")
 
@@ -135,14 +123,13 @@ def simulate(parser: Parser) -> None:
     )
     choice, number = group.add_mutually_exclusive_group(), options.number
     ramp = "rises or falls evenly within so many seconds, and stays"
-    choice.add_argument(
-        "--ramp", nargs=3, type=number, metavar=("FROM", "TO", "SECONDS"), help=ramp
-    )
     held, wave = "levels, each held HOLD s", "a mean with waves on it, frequencies in Hz"
-    choice.add_argument("--staircase", nargs="+", type=number, metavar=("HOLD", "LEVEL"), help=held)
-    choice.add_argument(
-        "--sine", nargs="+", type=number, metavar=("MEAN", "AMPLITUDE FREQUENCY"), help=wave
-    )
+    for name, count, words, what in (
+        ("--ramp", 3, ("FROM", "TO", "SECONDS"), ramp),
+        ("--staircase", "+", ("HOLD", "LEVEL"), held),
+        ("--sine", "+", ("MEAN", "AMPLITUDE FREQUENCY"), wave),
+    ):
+        choice.add_argument(name, nargs=count, type=number, metavar=words, help=what)
     choice.add_argument("--flow", type=Path, help="measured, as CSV: time, omega_0 on each line")
     longest = "longest time between lines of --flow (default: ten times the usual one)"
     group.add_argument("--longest-interval", type=options.seconds, help=longest)
@@ -158,15 +145,11 @@ def simulate(parser: Parser) -> None:
 @command("the ball", "look.inspect", "run.h5 --plot run.png")
 def inspect(parser: Parser) -> None:
     """What a trajectory file holds; or how a claim comes to its verdict."""
-    what = (
-        "a run, or a collection of 'dualball collect'; of a claim the directory of a validation "
-        "(default: results)"
-    )
-    parser.add_argument("file", type=Path, nargs="?", help=what)
-    chain = (
-        "the chain of a claim: statement, measurement, numbers, verdict, each with file and line"
-    )
-    parser.add_argument("--claim", metavar="ID", help=chain)
+    what = "a run, or a collection of 'dualball collect'"
+    of_claim = "of a claim the directory of a validation (default: results)"
+    parser.add_argument("file", type=Path, nargs="?", help=f"{what}; {of_claim}")
+    links = "statement, measurement, numbers, verdict, each with file and line"
+    parser.add_argument("--claim", metavar="ID", help=f"the chain of a claim: {links}")
     options.add_plot(parser, "the run, or what the runs of a collection read")
     written = "write samples, or the runs of a collection, as a table (default: don't)"
     parser.add_argument("--table", type=TABLE, help=written)
@@ -195,16 +178,12 @@ def sweep(parser: Parser) -> None:
     options.add_parameters(parser)
     options.add_start(parser)
     options.add_axes(parser, "--vary", "a range, or NAME=A,B,C; several make a grid", required=True)
-    parser.add_argument(
-        "--random", type=options.count, help="N points that fill the ranges NAME=FROM:TO instead"
-    )
-    parser.add_argument(
-        "--seed", type=options.seed, default=0, help="seed of the points of --random"
-    )
-    ways, meaning = (
-        ("held", "up", "down", "both"),
-        "held: a run for each point; else one run, omega_0 in steps",
-    )
+    filling = "N points that fill the ranges NAME=FROM:TO instead"
+    parser.add_argument("--random", type=options.count, help=filling)
+    seed = "seed of the points of --random"
+    parser.add_argument("--seed", type=options.seed, default=0, help=seed)
+    ways = "held", "up", "down", "both"
+    meaning = "held: a run for each point; else one run, omega_0 in steps"
     parser.add_argument("--direction", choices=ways, default="held", help=meaning)
     options.add_engine(parser)
     lasts = "duration of a run that is held, and else of each step"
@@ -258,11 +237,10 @@ def attractors(parser: Parser) -> None:
     parser.excludes("--start", "--random", "--seed")
 
 
-@command(
-    "the ball",
-    "attractors.run_basins",
-    "--set hopping --across omega_c=0:150:21 --up slip_x=-900:900:21",
-)
+_PLANE = "--across omega_c=0:150:21 --up slip_x=-900:900:21"
+
+
+@command("the ball", "attractors.run_basins", f"--set hopping {_PLANE}")
 def basins(parser: Parser) -> None:
     """What becomes of the ball from each start of a plane of states; what MuJoCo has run is
     kept."""
@@ -272,12 +250,10 @@ def basins(parser: Parser) -> None:
         text = f"a state variable {name} the plane, and its range"
         parser.add_argument(f"--{name}", required=True, metavar="NAME=FROM:TO:COUNT", help=text)
     points = "every N-th point along both axes by MuJoCo, too; 0: none"
-    parser.add_argument(
-        "--mujoco", type=Number(allowed=Range(0, 1e6, whole=True)), default=0, help=points
-    )
-    parser.add_argument(
-        "--timestep", type=options.seconds, default=2.5e-4, help="time step of MuJoCo"
-    )
+    every = Number(allowed=Range(0, 1e6, whole=True))
+    parser.add_argument("--mujoco", type=every, default=0, help=points)
+    step = "time step of MuJoCo"
+    parser.add_argument("--timestep", type=options.seconds, default=2.5e-4, help=step)
     options.add_workers(parser)
     drawn = "write the map: drawn as png, svg or pdf, or its data as json (default: don't)"
     parser.add_argument("-o", "--output", type=MAP, dest="map", help=drawn)
@@ -301,9 +277,8 @@ def design(parser: Parser) -> None:
     )
     parser.add_argument("file", type=Path, metavar="FILE.toml", help=tables)
     parser.add_argument("-o", "--output", type=PAGE, help="HTML page to write (default: none)")
-    parser.add_argument(
-        "--seed", type=options.seed, default=0, help="seed of the random numbers of the search"
-    )
+    random = "seed of the random numbers of the search"
+    parser.add_argument("--seed", type=options.seed, default=0, help=random)
     options.add_json(parser, "print JSON instead of tables")
 
 
@@ -354,24 +329,17 @@ def explore(parser: Parser) -> None:
 def forecast(parser: Parser) -> None:
     """What the contacts of a MuJoCo model will do: depth, creep, hovering, largest step."""
     parser.add_argument("file", type=Path, metavar="MODEL.xml", help="MJCF or URDF")
-    parser.add_argument(
-        "--keyframe",
-        metavar="NAME",
-        type=str.strip,
-        help="begin with this keyframe, by name or number",
-    )
+    begin = "begin with this keyframe, by name or number"
+    parser.add_argument("--keyframe", metavar="NAME", type=str.strip, help=begin)
     driven = "controls: a number for each actuator, or NAME=NUMBER for some"
     parser.add_argument("--ctrl", nargs="+", default=[], metavar="[NAME=]N", help=driven)
     longest = "longest time to wait until the model has settled; 0 takes the state as it stands"
     parser.add_argument("--settle", type=options.moment, default=10.0, help=longest)
     for name, unit, how in (("creep", "m s-1", "creeps faster"), ("depth", "m", "sinks in deeper")):
-        limit = Number(unit, POSITIVE)
-        parser.add_argument(
-            f"--max-{name}", type=limit, help=f"exit with 1 if a pair {how}, measured"
-        )
-    parser.add_argument(
-        "--try", dest="tries", action="store_true", help="follow the advice and measure again"
-    )
+        limit, more = Number(unit, POSITIVE), f"exit with 1 if a pair {how}, measured"
+        parser.add_argument(f"--max-{name}", type=limit, help=more)
+    again = "follow the advice and measure again"
+    parser.add_argument("--try", dest="tries", action="store_true", help=again)
     parser.add_argument("-o", "--output", type=PAGE, help="HTML page to write")
     options.add_json(parser)
 
@@ -404,7 +372,6 @@ COMMANDS = {name: each for group in GROUPS.values() for name, each in group.item
 
 
 def declare(commands: options.Commands, name: str) -> None:
-    """Add a command to those of the program."""
     of = COMMANDS[name]
     told = f"dualball {name} {of.example}"
     said = ". ".join(filter(None, of.about))
@@ -432,33 +399,21 @@ def parser(words: Sequence[str]) -> Parser:
         declare(commands, words[0])
         return parser
     if not words[0].startswith("-"):
-        raise InputError(
-            f"there is no command {words[0]!r}{suggestion(words[0], COMMANDS)}; see 'dualball "
-            f"--help'"
-        )
+        meant = suggestion(words[0], COMMANDS)
+        raise InputError(f"there is no command {words[0]!r}{meant}; see 'dualball --help'")
     if words[0] not in ("-h", "--help", "--version"):
-        raise InputError(
-            f"there is no option {words[0]!r}{suggestion(words[0], ['--help', '--version'])}"
-        )
+        meant = suggestion(words[0], ["--help", "--version"])
+        raise InputError(f"there is no option {words[0]!r}{meant}")
     listed = []
     for title, group in GROUPS.items():
         listed.append(f"\n{title.capitalize()}:")
         for name, command in group.items():
             commands.add_parser(name)
-            listed.append(
-                textwrap.fill(
-                    command.about[0],
-                    100,
-                    initial_indent=f"  {name:<12}",
-                    subsequent_indent=" " * 14,
-                )
-            )
+            about = textwrap.wrap(command.about[0], 86)
+            listed.append(f"  {name:<12}" + f"\n{'':14}".join(about))
     parser.add_argument("--version", action="store_true", help="show the version")
-    parser.add_argument(
-        "--print-completion",
-        metavar="SHELL",
-        help="print what bash, zsh, fish or tcsh complete words by",
-    )
+    words_of = "print what bash, zsh, fish or tcsh complete words by"
+    parser.add_argument("--print-completion", metavar="SHELL", help=words_of)
     parser.epilog = "\n".join([*listed, "\n'dualball COMMAND --help' says more."]).lstrip("\n")
     return parser
 

@@ -28,7 +28,6 @@ from model.trajectory import AXES
 
 
 def show_parameters(args: argparse.Namespace) -> int:
-    """Show every parameter, with its value in the set asked for, and all sets' names."""
     p, rows, cells = options.parameters(args), [], [["option", "value", "unit", "range", "meaning"]]
     for field in Parameters.quantities():
         about, value = field.metadata, getattr(p, field.name)
@@ -45,19 +44,12 @@ def show_parameters(args: argparse.Namespace) -> int:
         "A file of your own for --parameters: TOML, a line NAME = value each, named as in the "
         "options (omega_0)."
     )
-    options.show(
-        {"parameters": rows, "drag": p.drag, "sets": Parameters.names()},
-        args.json,
-        shown,
-        "",
-        own,
-        toml,
-    )
+    data = {"parameters": rows, "drag": p.drag, "sets": Parameters.names()}
+    options.show(data, args.json, shown, "", own, toml)
     return 0
 
 
 def run(args: argparse.Namespace) -> int:
-    """Show what theory predicts of a parameter set."""
     data = described(p := options.parameters(args))
     if args.table:
         table.write(args.table, labelled(data))
@@ -86,7 +78,8 @@ def described(p: Parameters) -> dict[str, Any]:
         "model_holds": off <= real_fluid.LIMIT if p.nu_f else None,
         "model_error": off,
         "fluid_torque": {
-            by: real_fluid.rolling(p, by == "boundary layer") for by in ("Stokes", "boundary layer")
+            "Stokes": real_fluid.rolling(p, False),
+            "boundary layer": real_fluid.rolling(p),
         },
         "groups": {"kappa": p.kappa, "Omega_0": p.Omega_0},
         "thresholds": dataclasses.asdict(analytic.thresholds(p)),
@@ -121,9 +114,8 @@ def reading(p: Parameters) -> str:
     cases = list(dict.fromkeys(solution.case for solution in attractors))
     if not cases:
         return "no stationary motion attracts the ball"
-    if all(
-        math.isclose(s.state.omega_c, p.omega_0, rel_tol=1e-12, abs_tol=1e-300) for s in attractors
-    ):
+    read, close = [s.state.omega_c for s in attractors], {"rel_tol": 1e-12, "abs_tol": 1e-300}
+    if all(math.isclose(omega_c, p.omega_0, **close) for omega_c in read):
         return f"the ball goes round with the fluid ({' or '.join(case.name for case in cases)})"
     if len(cases) == 1 and cases[0] not in (Case.SR, Case.NR):
         lag = 1 - attractors[0].state.omega_c / p.omega_0
@@ -157,7 +149,6 @@ def tables(p: Parameters, data: dict[str, Any]) -> list[Table | Text | str]:
 
 
 def _answer(p: Parameters, data: dict[str, Any], shown: Digits) -> list[Text]:
-    """The reading at the flow, and how far the operating range goes."""
     because = data["operating_range_ends"]["because"]
     reach = f"It has no operating range: {because}."
     if limit := data["operating_range"]:
@@ -168,7 +159,6 @@ def _answer(p: Parameters, data: dict[str, Any], shown: Digits) -> list[Text]:
 
 
 def _thresholds(data: dict[str, Any], shown: Digits) -> Table:
-    """A table of all thresholds."""
     rows = [["", "value", "what happens there"]]
     for name, value in data["thresholds"].items():
         symbol, unit = (QUANTITIES[name].symbol, " rad/s") if name in QUANTITIES else ("η_cr", "")
@@ -178,14 +168,12 @@ def _thresholds(data: dict[str, Any], shown: Digits) -> Table:
 
 
 def _solutions(p: Parameters, data: dict[str, Any], shown: Digits) -> Table:
-    """A table of all stationary solutions, dim those that attract nothing."""
     solutions = data["solutions"]
-    rows = [
-        [label, *(show(s, shown) for s in solutions)]
-        for label, show in _ROWS.items()
-        if label != "Re" or p.nu_f
-    ]
-    made = pages.table("Stationary solutions", [["", *(s["case"] for s in solutions)], *rows])
+    rows = [["", *(s["case"] for s in solutions)]]
+    for label, show in _ROWS.items():
+        if label != "Re" or p.nu_f:
+            rows.append([label, *(show(s, shown) for s in solutions)])
+    made = pages.table("Stationary solutions", rows)
     attracting = {s.case.name for s in analytic.stable_solutions(p)}
     for column, s in zip(made.columns[1:], solutions, strict=True):
         column.style = "" if s["exists"] and s["case"] in attracting else "dim"
@@ -222,7 +210,6 @@ def _remarks(p: Parameters, data: dict[str, Any]) -> list[Text | str]:
 
 
 def _set(p: Parameters) -> list[Table | Text]:
-    """The parameters of a set, and its dimensionless groups."""
     given = [["", "", ""]]
     for field in p.quantities():
         meta, value = field.metadata, f"{getattr(p, field.name):.8g}"

@@ -42,7 +42,6 @@ def flow(args: argparse.Namespace) -> Flow | None:
 
 
 def settings(args: argparse.Namespace, p: Parameters) -> AnySettings:
-    """Settings of the chosen engine for a ball; `InputError` for an option of others."""
     chosen: study.Engine = args.engine
     given = given_options(args, ("timestep", "rtol", "restitution"))
     for name in given:
@@ -53,7 +52,6 @@ def settings(args: argparse.Namespace, p: Parameters) -> AnySettings:
 
 
 def task(args: argparse.Namespace, p: Parameters, **more: Any) -> Task:
-    """The run of a ball that the options describe."""
     chosen, asked = settings(args, p), getattr(args, "sample_interval", None)
     given = {"x0": start(args), "t_end": args.time, "settings": chosen, "sample_interval": asked}
     made = Task(engine=args.engine.name, parameters=p, **given | more)
@@ -65,7 +63,6 @@ def task(args: argparse.Namespace, p: Parameters, **more: Any) -> Task:
 
 
 def workers(args: argparse.Namespace) -> Workers:
-    """The workers that the options of `add_workers` name."""
     return dask(args.scheduler) if args.scheduler else processes(args.workers)
 
 
@@ -82,7 +79,6 @@ def campaign(args: argparse.Namespace, doing: str, **more: Any) -> Iterator[Camp
 
 
 def start(args: argparse.Namespace) -> State:
-    """The initial state of `add_start`."""
     units, values = dict(zip(VARIABLES, UNITS, strict=True)), {}
     for item in args.start:
         name, _, value = item.partition("=")

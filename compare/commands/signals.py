@@ -79,7 +79,6 @@ def noted() -> Iterator[list[int]]:
 
 
 def _send_later(number: int, seconds: float) -> threading.Timer:
-    """Send a signal a little later."""
     timer = threading.Timer(seconds, os.kill, (os.getpid(), number))
     timer.daemon = True
     timer.start()
@@ -133,7 +132,6 @@ def raised() -> Iterator[None]:
 
 
 def end(number: int, frame: FrameType | None) -> NoReturn:
-    """End the process at once."""
     with suppress(OSError):  # standard error may be closed
         os.write(2, b"dualball: interrupted\n")
     leave(128 + number)

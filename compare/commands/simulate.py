@@ -71,7 +71,6 @@ def run(args: argparse.Namespace) -> int:
 
 
 def run_sweep(args: argparse.Namespace) -> int:
-    """Carry out the runs that are not done yet and say which failed."""
     p = options.parameters(args)
     tasks = _sweep_tasks(args, p)
     save = collection.save_means if args.means_only else storage.save_batch
@@ -143,7 +142,6 @@ def _refuse_another_sweep(args: argparse.Namespace, p: Parameters) -> None:
 
 
 def collect(args: argparse.Namespace) -> int:
-    """Gather the runs of a directory into one file."""
     with tempfile.TemporaryDirectory() as scratch:
         path = Path(scratch) / "runs.h5" if options.is_table(args.output) else args.output
         count = collection.collect(args.directory, path, args.workers, args.tell)
