@@ -79,13 +79,7 @@ class ContactCase(Scene):
         A soft contact touches halfway between the body's own surface and the other."""
         body = self.bodies[-1]
         position, velocity, spin = np.split(states[:, -9:], 3, axis=1)
-        gaps, slips = list[Array](), list[Array]()
-
-        def add_contact(gap: Array, slip: Array, normal: Array) -> None:
-            along = slip - np.sum(slip * normal, axis=1)[:, None] * normal
-            gaps.append(gap)
-            slips.append(np.linalg.norm(along, axis=1))
-
+        found = list[tuple[Array, Array, Array]]()  # gap, slip and normal
         for surface in self.surfaces:
             away = position - surface.point
             if surface.radius is None:
@@ -99,14 +93,17 @@ class ContactCase(Scene):
             arm = -(reach(body, normal) + np.minimum(gap, 0.0) / 2)[:, None] * normal
             moves = surface.velocity + surface.turning * np.cross([0.0, 0.0, 1.0], away + arm)
             turns = np.cross(spin, arm) if body.shape == "sphere" else 0
-            add_contact(gap, velocity + turns - moves, normal)
+            found.append((gap, velocity + turns - moves, normal))
         if self.under:
             apart = states[:, :3] - position
             gap = np.sum(apart * normal, axis=1) - reach(self.body, normal) - reach(body, normal)
-            add_contact(gap, states[:, 3:6] - velocity, normal)
+            found.append((gap, states[:, 3:6] - velocity, normal))
         if self.joint:
-            add_contact(np.zeros(len(states)), velocity, np.zeros(3))
-        return np.stack(gaps, axis=1), np.stack(slips, axis=1)
+            found.append((np.zeros(len(states)), velocity, np.zeros(3)))
+        gaps = [gap for gap, _, _ in found]
+        slips = [slip - np.sum(slip * n, axis=1)[:, None] * n for _, slip, n in found]
+        speeds = [np.linalg.norm(slip, axis=1) for slip in slips]
+        return np.stack(gaps, axis=1), np.stack(speeds, axis=1)
 
     def in_contact(self, letters: str) -> Array:
         """Where contacts of the exact motion are in one of these states; (n, surfaces)."""

@@ -241,8 +241,8 @@ def step_to_most_contacts(model: Any, data: Any, step: Advance) -> None:
     for _ in range(WINDOW_STEPS):
         step(model, data, 1)
         mujoco.mj_forward(model, data)
-        if len(loads_by_pair(model, data)) > most:
-            most, best = len(loads_by_pair(model, data)), copy.copy(data)
+        if (found := len(loads_by_pair(model, data))) > most:
+            most, best = found, copy.copy(data)
     if most:
         mujoco.mj_copyData(data, model, best)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import mujoco
@@ -124,32 +124,26 @@ class Lawful(Bodies):
         self.data.qfrc_applied[-2:] = push * (velocity @ normal, velocity[2])
 
 
-def pairs(spec: Any, scene: Scene) -> Iterator[Any]:
-    """Contact pairs of each surface and what touches it; where there is none, one is added with the
-    surface's friction."""
-    lowest = "under" if scene.under else "body"
-    there = {(pair.geomname1, pair.geomname2): pair for pair in spec.pairs}
-    shapes: dict[str, list[str]] = {}
-    for geom in spec.geoms:
-        shapes.setdefault(geom.name.rstrip("0123456789"), []).append(geom.name)
-    for surface in scene.surfaces:
-        for geom, part in itertools.product(shapes[surface.name], shapes[lowest]):
-            if not (pair := there.get((geom, part))):
-                pair = spec.add_pair(geomname1=geom, geomname2=part, condim=3)
-                pair.friction = (surface.friction, surface.friction, 0.0, 0.0, 0.0)
-            yield pair
-
-
 def studied(spec: Any, scene: Scene, timestep: float) -> None:
     """Set an elliptic cone, stiff friction, and normal rows soft enough for blocks on four points.
 
     b_f h is a tenth, so that contacts don't hover at 2 m/s; impratio 1e4 leaves a creep of some
-    micrometres a second."""
+    micrometres a second. That needs a pair of each surface and what touches it: where there is
+    none, one is added with the surface's friction."""
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     spec.option.impratio, spec.option.tolerance = 1e4, 1e-12
-    for pair in pairs(spec, scene):
-        pair.solref, pair.solreffriction = (6 * timestep, 1.0), (100 * timestep, 1.0)
-        pair.solimp = (0.2, 0.2, 1e-4, 0.5, 2.0)
+    there = {(pair.geomname1, pair.geomname2): pair for pair in spec.pairs}
+    shapes: dict[str, list[str]] = {}
+    for geom in spec.geoms:
+        shapes.setdefault(geom.name.rstrip("0123456789"), []).append(geom.name)
+    lowest = shapes["under" if scene.under else "body"]
+    for surface in scene.surfaces:
+        for geom, part in itertools.product(shapes[surface.name], lowest):
+            if not (pair := there.get((geom, part))):
+                pair = spec.add_pair(geomname1=geom, geomname2=part, condim=3)
+                pair.friction = (surface.friction, surface.friction, 0.0, 0.0, 0.0)
+            pair.solref, pair.solreffriction = (6 * timestep, 1.0), (100 * timestep, 1.0)
+            pair.solimp = (0.2, 0.2, 1e-4, 0.5, 2.0)
 
 
 def rigid(spec: Any, scene: Scene, timestep: float) -> None:
