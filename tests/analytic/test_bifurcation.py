@@ -18,12 +18,8 @@ def test_thresholds_that_do_not_exist():
     """Their values elsewhere claims hold."""
 
     def missing(**change):
-        t = thresholds(P.replace(**change))
-        return {
-            n
-            for n in ("omega_01", "omega_02", "omega_03", "omega_04", "eta_cr")
-            if np.isnan(getattr(t, n))
-        }
+        of = vars(thresholds(P.replace(**change)))
+        return {name for name, value in of.items() if np.isnan(value)}
 
     assert missing() == set()
     assert missing(eta=0.6) == {"omega_01", "omega_04"}
@@ -34,9 +30,8 @@ def test_thresholds_that_do_not_exist():
     assert thresholds(P.replace(mu=0.0)).omega_01 == 0
     assert thresholds(P.replace(mu=0.0)).eta_cr == np.inf
     assert thresholds(P.replace(c=0.0)).eta_cr == 0
-    assert thresholds(P.replace(c=diagram.critical_drag(P))).eta_cr == pytest.approx(
-        P.eta, rel=8 * EPS
-    )
+    critical = thresholds(P.replace(c=diagram.critical_drag(P)))
+    assert critical.eta_cr == pytest.approx(P.eta, rel=8 * EPS)
     assert diagram.critical_drag(P.replace(drag="quadratic", nu_f=1e-5)) == np.inf
 
 
@@ -55,12 +50,8 @@ def test_solutions_appear_and_vanish_at_the_thresholds(eta, name, changes):
     """Their number changes exactly there: relative 1e-9 on either side."""
     p = P.replace(eta=eta)
     flows = getattr(thresholds(p), name) * np.array([1 - 1e-9, 1 + 1e-9])
-    below, above = (
-        Counter(
-            s.case.name for s in stationary_solutions(p.replace(omega_0=float(flow))) if s.exists
-        )
-        for flow in flows
-    )
+    either = (stationary_solutions(p.replace(omega_0=flow)) for flow in flows.tolist())
+    below, above = (Counter(s.case.name for s in solutions if s.exists) for solutions in either)
     above.subtract(below)
     assert {case: number for case, number in above.items() if number} == changes
 
@@ -85,9 +76,7 @@ def test_the_fluid_that_comes_along_slows_the_answer():
     added to its own."""
     p = Parameters.named("steel-in-water").replace(density_ratio=0.4)
     # m (1 + s/2) R w' = A_z + B_z + push, j m R w' = -A_z, j m R w' = -B_z
-    m, jm = p.m * (1 + p.density_ratio / 2) * p.R, p.j * p.m * p.R
-    rate, without = (
-        np.linalg.solve([[mass, -1, -1], [jm, 1, 0], [jm, 0, 1]], [1.0, 0, 0])[0]
-        for mass in (m, p.m * p.R)
-    )
+    jm, masses = p.j * p.m * p.R, (p.m * (1 + p.density_ratio / 2) * p.R, p.m * p.R)
+    balances = ([[mass, -1, -1], [jm, 1, 0], [jm, 0, 1]] for mass in masses)
+    rate, without = (np.linalg.solve(each, [1.0, 0, 0])[0] for each in balances)
     assert diagram.inertia_shifts(p)["rolling_rate"] == pytest.approx(rate / without - 1, rel=1e-12)

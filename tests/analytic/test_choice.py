@@ -40,16 +40,12 @@ def steep(p, eps):
 
     def forces(z):
         _, slip_x, slip_y, slip_z = z
-        state = State(0.0, 0.0, *z)
-        return dynamics.forces(
-            Case.SS, state, p, p.omega_0, direction(slip_x, slip_z), direction(slip_y, slip_z)
-        )
+        directions = direction(slip_x, slip_z), direction(slip_y, slip_z)
+        return dynamics.forces(Case.SS, State(0.0, 0.0, *z), p, p.omega_0, *directions)
 
     def rates(_, z):
-        _, _, *rate, _, _ = dynamics.newton_euler(
-            Case.SS, State(0.0, 0.0, *z), forces(z), p, p.omega_0
-        )
-        return rate
+        x = State(0.0, 0.0, *z)
+        return dynamics.newton_euler(Case.SS, x, forces(z), p, p.omega_0)[2:6]
 
     return rates, forces
 
@@ -60,10 +56,8 @@ def random_rolling(rng):
     mu, eta = (10 ** rng.uniform(-1.5, math.log10(most)) for most in (3, 2))
     j = rng.uniform(0.1, 0.66)
     load = 10 ** rng.uniform(-1, 1)
-    omega_c = math.sqrt(load) * UNIT
-    lag = (
-        rng.choice([0.0, rng.uniform(-1.5, 1.5)]) * (1 + 2 * j) / j * min(mu, eta * (1 + j) * load)
-    )
+    omega_c, most = math.sqrt(load) * UNIT, min(mu, eta * (1 + j) * load)
+    lag = rng.choice([0.0, rng.uniform(-1.5, 1.5)]) * (1 + 2 * j) / j * most
     return P.replace(mu=mu, eta=eta, j=j, c=UNIT, omega_0=omega_c + lag * UNIT), omega_c
 
 
@@ -109,9 +103,8 @@ def test_the_limit_of_a_steep_contact(p):
     assert (Case.RR, Case.SS) in zip(ours.events.from_case, ours.events.to_case, strict=True)
     errors = []
     for eps in (1e-2, 1e-3):
-        run = solve_ivp(
-            steep(p, eps)[0], (0, 2), x0[2:], method="LSODA", t_eval=ours.time, rtol=1e-8, atol=1e-9
-        )
+        how = {"method": "LSODA", "t_eval": ours.time, "rtol": 1e-8, "atol": 1e-9}
+        run = solve_ivp(steep(p, eps)[0], (0, 2), x0[2:], **how)
         errors.append([np.abs(run.y.T - other.x[:, 2:6]).max() for other in (ours, jammed)])
     coarse, fine = np.array(errors)
     assert fine[0] < coarse[0] / 5  # 10^(4/5) = 6.3
@@ -125,9 +118,8 @@ def test_a_slight_disturbance_ends_rolling_in_time_stepping_too():
     omega_c = 0.8435 * p.omega_0
     assert rolling_forces.slip_margin(omega_c, p) < 0 < rolling_forces.margin(omega_c, p)
     x0 = State(omega_c=omega_c, slip_z=1e-5 * p.omega_0 * p.R / p.r)
-    event, stepped = (
-        simulate(p, x0, 0.2, sample_interval=0.02, method=m) for m in ("event", "time-stepping")
-    )
+    ways = ("event", "time-stepping")
+    event, stepped = (simulate(p, x0, 0.2, sample_interval=0.02, method=way) for way in ways)
     np.testing.assert_allclose(stepped.omega_c, event.omega_c, atol=1e-3 * p.omega_0)
     assert np.ptp(event.omega_c) > 0.01 * p.omega_0
 
@@ -152,17 +144,14 @@ def test_never_beyond_what_forces_can_hold_and_continuous_where_it_ends():
         case = Case(number)
         ends.add((case, sense))
         slips = (onset.alpha, case.A), (onset.beta, case.B)
-        directions = [
-            (math.sin(angle), math.cos(angle)) for angle, contact in slips if contact is Contact.S
-        ]
+        angles = [angle for angle, contact in slips if contact is Contact.S]
+        directions = [(math.sin(angle), math.cos(angle)) for angle in angles]
         forces = dynamics.FORCES[case](at.x, p, fluid, *directions)
         assert rolling_forces.margin(omega_c, p, fluid) > -1e-12
         assert math.hypot(forces.A_x, forces.A_z) <= p.mu * forces.A_y * (1 + 1e-9)
         assert math.hypot(forces.B_y, forces.B_z) <= p.eta * forces.B_x * (1 + 1e-9)
         rate = dynamics.newton_euler(case, at.x, forces, p, fluid)
-        np.testing.assert_allclose(
-            [rate.slip_x, rate.slip_y, rate.slip_z], 0.0, atol=1e-9 * p.g / p.r
-        )
+        assert np.abs(rate[3:6]).max() <= 1e-9 * p.g / p.r
     assert ends == set(itertools.product((Case.RS, Case.SR, Case.SS), (1, -1)))
 
 
@@ -177,23 +166,18 @@ def test_a_single_rolling_contact_holds_or_gives_way(rolls):
     for _ in range(200):
         p, omega_c = random_rolling(rng)
         sense = rng.choice([-1.0, 1.0])
-        x = State(
-            omega_c=omega_c,
-            slip_x=0.0 if rolls == "A" else sense,
-            slip_y=sense if rolls == "A" else 0.0,
-        )
-        case = Case.RS if rolls == "A" else Case.SR
+        slips, case = ("slip_y", Case.RS) if rolls == "A" else ("slip_x", Case.SR)
+        x = State(omega_c=omega_c, **{slips: sense})
         f = dynamics.forces(case, x, p, p.omega_0)
         if f.A_y <= 0:
             continue
-        free = smooth_rates(
-            velocities(x, p), 0.0, 0.0, of_ball(p, Flow.steady(p.omega_0), Settings())
-        )
+        k = of_ball(p, Flow.steady(p.omega_0), Settings())
+        free = smooth_rates(velocities(x, p), 0.0, 0.0, k)
         known = Closed(0.0, 0.0, -sense if rolls == "B" else sense)
         A, B = (Closed(), known) if rolls == "A" else (known, Closed())
-        load, friction = (
-            (p.mu * f.A_y, (f.A_x, f.A_z)) if rolls == "A" else (p.eta * f.B_x, (f.B_y, f.B_z))
-        )
+        load, friction = p.eta * f.B_x, (f.B_y, f.B_z)
+        if rolls == "A":
+            load, friction = p.mu * f.A_y, (f.A_x, f.A_z)
         if abs(math.hypot(*friction) / load - 1) < 1e-3:
             continue
         for angle in np.arange(8) * math.pi / 4:  # from full friction in any direction

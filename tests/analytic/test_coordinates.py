@@ -88,16 +88,14 @@ def test_forces_at_the_wall(case, law):
         x, slips = at.x, [(math.sin(angle), math.cos(angle)) for angle in (at.alpha, at.beta)]
         c = equations.drag_rate(x.v_h, x.v_y, k.R * (x.omega_c - omega_0), k)
         assert c == pytest.approx(drag.of_velocity(x.v_h, x.v_y, k.R * (x.omega_c - omega_0), p))
-        mine = equations.forces(
-            int(case), x.omega_c, x.v_y, x.slip_x, c, x.omega_c - omega_0, *slips[0], *slips[1], k
-        )
+        given = int(case), x.omega_c, x.v_y, x.slip_x, c, x.omega_c - omega_0
+        mine = equations.forces(*given, *slips[0], *slips[1], k)
         if case is Case.RR:
             expected = dynamics.rolling_family(x.omega_c, p, omega_0, 0.0)
         else:
             expected = dynamics.forces(case, x, p, omega_0, *slips)
-        np.testing.assert_allclose(
-            mine, np.array(expected, float), rtol=1e-12, atol=1e-12 * max(map(abs, mine))
-        )
+        error = 1e-12 * max(map(abs, mine))
+        np.testing.assert_allclose(mine, np.array(expected, float), rtol=1e-12, atol=error)
 
 
 @pytest.mark.parametrize(
@@ -107,10 +105,7 @@ def test_forces_at_the_wall(case, law):
 def test_where_rolling_at_both_points_ends(mu, eta, leaves):
     rng, p = np.random.default_rng(3), P.replace(mu=mu, eta=eta)
     k = motion.of_ball(p, FLOW, Settings(leave_rolling=leaves))
-    margin = {
-        "slip-stability": rolling_forces.slip_margin,
-        "infeasible": rolling_forces.margin,
-    }[leaves]
+    margin = rolling_forces.margin if leaves == "infeasible" else rolling_forces.slip_margin
     omega_c = rng.uniform(-40, 40, 300)
     mine = [equations.rolls_on(each, TIME, k) for each in omega_c.tolist()]
     np.testing.assert_allclose(mine, margin(omega_c, p, FLOW(TIME)), rtol=1e-12, atol=1e-12)

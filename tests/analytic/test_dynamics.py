@@ -37,15 +37,10 @@ HELD[Case.RN] |= {STATE[5]: -STATE[7] / r}
 def equations(case):
     """(20) with what Table 3 adds, known force components and rates of constraints: each zero,
     linear in both."""
-    of_time = y, v_y, omega_c, slip_x, slip_y, slip_z, h, v_h = [
-        sp.Function(name)(t) for name in VARIABLES
-    ]
-    rho, frame, A, B = (
-        R - h,
-        sp.Matrix([0, omega_c, 0]),
-        sp.Matrix([0, -r, 0]),
-        sp.Matrix([-r, 0, 0]),
-    )
+    of_time = [sp.Function(name)(t) for name in VARIABLES]
+    y, v_y, omega_c, slip_x, slip_y, slip_z, h, v_h = of_time
+    rho, frame = R - h, sp.Matrix([0, omega_c, 0])
+    A, B = sp.Matrix([0, -r, 0]), sp.Matrix([-r, 0, 0])
     place = sp.Matrix([-rho, r + y, 0])
     v_C = (place.diff(t) + frame.cross(place)).subs({y.diff(t): v_y, h.diff(t): v_h})
     spin = sp.Matrix([rho * omega_c / r + slip_x, -rho * omega_c / r + slip_y, v_y / r + slip_z])
@@ -54,31 +49,22 @@ def equations(case):
     newton = weight + FORCE_A + FORCE_B + drag - m * (v_C.diff(t) + frame.cross(v_C))
     # omega x J omega vanishes for a sphere
     turning = j * m * r**2 * (spin.diff(t) + frame.cross(spin))
-    found = [
-        *newton,
-        *(A.cross(FORCE_A) + B.cross(FORCE_B) - turning),
-        y.diff(t) - v_y,
-        h.diff(t) - v_h,
-    ]
+    moments = A.cross(FORCE_A) + B.cross(FORCE_B) - turning
+    found = [*newton, *moments, y.diff(t) - v_y, h.diff(t) - v_h]
     found += list(FORCE_A) if case.A is Contact.N else [v_y.diff(t)]
     found += list(FORCE_B) if case.B is Contact.N else [v_h.diff(t)]
     if case.A is Contact.S:  # (14) with dir v_A = (cos alpha, 0, -sin alpha)
-        found += [
-            FORCE_A[0] + mu * FORCE_A[1] * sp.cos(alpha),
-            FORCE_A[2] - mu * FORCE_A[1] * sp.sin(alpha),
-        ]
+        limit = mu * FORCE_A[1]
+        found += [FORCE_A[0] + limit * sp.cos(alpha), FORCE_A[2] - limit * sp.sin(alpha)]
     if case.B is Contact.S:  # (15) with dir v_B = (0, -cos beta, sin beta)
-        found += [
-            FORCE_B[1] - eta * FORCE_B[0] * sp.cos(beta),
-            FORCE_B[2] + eta * FORCE_B[0] * sp.sin(beta),
-        ]
+        limit = eta * FORCE_B[0]
+        found += [FORCE_B[1] - limit * sp.cos(beta), FORCE_B[2] + limit * sp.sin(beta)]
     if case.A is Contact.R:
         found += [v_A[0].diff(t), v_A[2].diff(t)]
     if case.B is Contact.R:
         found += [v_B[1].diff(t), v_B[2].diff(t)]
-    symbols = {f.diff(t): rate for f, rate in zip(of_time, RATE, strict=True)} | dict(
-        zip(of_time, STATE, strict=True)
-    )
+    symbols = {f.diff(t): rate for f, rate in zip(of_time, RATE, strict=True)}
+    symbols |= dict(zip(of_time, STATE, strict=True))
     return [each.subs(symbols).subs(HELD[case]) for each in found]
 
 
@@ -112,9 +98,8 @@ def test_rolling_at_both_points_symbolically():
     (solution,) = sp.solve(equations(Case.RR), [*RATE, *FORCE_A, FORCE_B[0], FORCE_B[2]], dict=True)
     plain = SimpleNamespace(m=m, r=r, R=R, j=j, mu=mu, eta=eta, g=g, c=c, drag="stokes")
     family = dynamics.rolling_family(STATE[2], plain, omega_0, FORCE_B[1])
-    rates = dynamics.newton_euler(
-        Case.RR, [HELD[Case.RR].get(x, x) for x in STATE], family, plain, omega_0
-    )
+    state = [HELD[Case.RR].get(x, x) for x in STATE]
+    rates = dynamics.newton_euler(Case.RR, state, family, plain, omega_0)
     for name, mine in zip([*FORCE_A, *FORCE_B, *RATE], [*family, *rates], strict=True):
         assert sp.simplify(mine - solution.get(name, name)) == 0, str(name)
 
@@ -159,9 +144,8 @@ def test_shapes_and_a_flow_of_its_own(case):
     if case is not Case.RR:
         assert [f.shape for f in contact_forces(case, x, P, fluid)] == [(2, 3, 3)] * 2
     if case.B is not Contact.N:
-        np.testing.assert_array_equal(
-            vector_field(case, x[..., :6], P), vector_field(case, x, P)[..., :6]
-        )
+        six = vector_field(case, x[..., :6], P)
+        np.testing.assert_array_equal(six, vector_field(case, x, P)[..., :6])
 
 
 @pytest.mark.parametrize(

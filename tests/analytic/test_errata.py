@@ -11,6 +11,8 @@ from analytic import contact_forces, thresholds, vector_field
 from model import Case, Parameters
 
 P = Parameters.named("reference").replace(omega_0=17.0, mu=0.3, eta=0.45)
+STEEL = {"nu_f": 1.004e-6, "rho_f": 998.2, "rho_b": 7850.0, "R": 0.025, "mu": 0.2, "eta": 0.2}
+"""In water."""
 
 
 def test_section_1_1():
@@ -25,17 +27,14 @@ def test_section_1_1():
 
 def test_section_1_3():
     """Steel in water by (10)."""
-    water = {"nu_f": 1.004e-6, "rho_f": 998.2, "rho_b": 7850.0, "R": 0.025, "mu": 0.2, "eta": 0.2}
-    assert Parameters.from_fluid(r=2e-3, **water).c == pytest.approx(0.144, abs=1e-3)
-    assert Parameters.from_fluid(r=7.5e-3, **water).c == pytest.approx(1e-2, rel=0.03)
+    assert Parameters.from_fluid(r=2e-3, **STEEL).c == pytest.approx(0.144, abs=1e-3)
+    assert Parameters.from_fluid(r=7.5e-3, **STEEL).c == pytest.approx(1e-2, rel=0.03)
 
 
 def test_section_5_1():
     """eta_cr mu^2 = c^2 R/(4 g) isn't below 1e-6, and eta_cr may be above eta."""
     steel = Parameters.named("steel-in-water")
-    small = Parameters.from_fluid(
-        nu_f=1.004e-6, rho_f=998.2, rho_b=7850.0, r=2e-3, R=0.025, mu=0.2, eta=0.2
-    )
+    small = Parameters.from_fluid(r=2e-3, **STEEL)
     plastic = Parameters.named("plastic-in-oil")
     values = [thresholds(p).eta_cr * p.mu**2 for p in (steel, small, plastic)]
     assert values == pytest.approx([3.9e-7, 1.5e-5, 2.0e-2], rel=0.03)

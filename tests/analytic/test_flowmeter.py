@@ -23,20 +23,15 @@ def test_contacts_and_fluids_that_leave_no_range():
         assert {s.case for s in analytic.stable_solutions(p)} != {Case.RR}
     assert analytic.operating_range(P.replace(mu=0.0)) == 0
     assert analytic.operating_limit(P.replace(c=0.0)).end is End.NO_DRAG
-    assert (
-        analytic.operating_range(P.replace(c=0.0)) == analytic.reading_range(P.replace(c=0.0)) == 0
-    )
+    undamped = P.replace(c=0.0)
+    assert analytic.operating_range(undamped) == analytic.reading_range(undamped) == 0
     assert analytic.reading_range(ROUGH) == analytic.reading_range(P.replace(mu=0.0)) == np.inf
     assert np.isnan(analytic.unloading_limit(P.replace(eta=0.0)))
 
 
 def test_the_characteristic_has_two_branches_between_omega_02_and_omega_04():
     p = P.replace(omega_0=35.0)
-    assert (
-        analytic.characteristic_slope(p, Case.NR)
-        == analytic.characteristic_slope(p, Case.SR)
-        == 1.0
-    )
+    assert [analytic.characteristic_slope(p, case) for case in (Case.NR, Case.SR)] == [1.0, 1.0]
     assert analytic.characteristic_slope(P.replace(omega_0=-10.0)) == 1.0
 
 
@@ -46,9 +41,8 @@ def test_the_mean_of_the_slope_below_eta_cr():
     p = P.replace(eta=0.5 * analytic.thresholds(P).eta_cr)
     t = analytic.thresholds(p)
     near = analytic.solution(p.replace(omega_0=t.omega_02 * (1 - 1e-10)), Case.SS).state.omega_c
-    assert analytic.mean_slope(p) == pytest.approx(
-        (near - t.omega_01) / (t.omega_02 - t.omega_01), rel=1e-9
-    )
+    slope = (near - t.omega_01) / (t.omega_02 - t.omega_01)
+    assert analytic.mean_slope(p) == pytest.approx(slope, rel=1e-9)
 
 
 def test_a_peak_lies_between_the_points_of_a_grid():
@@ -72,21 +66,13 @@ def test_a_pulsation_may_need_a_larger_amplitude_than_a_fast_one():
 def test_forces_may_allow_more_on_a_rough_floor():
     """Between (73) and the cone of the floor, see docs/theory.md, section 7; elsewhere both ends of
     RR are one."""
-    p = P.replace(omega_0=12.0)
-    assert pulsation.slip_onset(p, 1.0, "infeasible") == pytest.approx(
-        pulsation.slip_onset(p, 1.0), rel=1e-9
-    )
+    onset, p = pulsation.slip_onset, P.replace(omega_0=12.0)
+    assert onset(p, 1.0, "infeasible") == pytest.approx(onset(p, 1.0), rel=1e-9)
     rough = p.replace(mu=0.92, eta=0.4, j=0.66)
-    assert pulsation.slip_onset(rough, 100.0, "infeasible") > 1.05 * pulsation.slip_onset(
-        rough, 100.0
-    )
+    assert onset(rough, 100.0, "infeasible") > 1.05 * onset(rough, 100.0)
     # No pulsation ends rolling without drag, any does beyond omega_01 and from rest.
-    for changes, onset in (
-        ({"c": 0.0}, math.inf),
-        ({"omega_0": 14.0}, 0.0),
-        ({"omega_0": 0.0}, 0.0),
-    ):
-        assert pulsation.slip_onset(P.replace(**changes), 1.0) == onset
+    assert onset(P.replace(c=0.0), 1.0) == math.inf
+    assert [onset(P.replace(omega_0=flow), 1.0) for flow in (14.0, 0.0)] == [0.0, 0.0]
 
 
 @pytest.mark.parametrize(
@@ -123,9 +109,6 @@ def test_a_mean_is_off_by_the_spin_about_the_tangent(name, share, times, case):
         assert error == pytest.approx(-turned * f / p.c, rel=1e-3)
         assert error < -0.01 * p.omega_0
     else:
-        assert {each.A.name for each in run.cases} | {each.B.name for each in run.cases} == {
-            "R",
-            "S",
-        }
+        assert {name for each in run.cases for name in each.name} == {"R", "S"}
         assert Case.SS not in run.cases
         assert abs(error) < 1e-6 * p.omega_0

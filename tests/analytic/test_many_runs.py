@@ -55,10 +55,8 @@ def landings(run):
 def test_event_driven_runs_agree(start, restitution, tolerance):
     """To what errors of 1e-9 in each grow to: chains of landings magnify them."""
     x0, (balls, flows) = STARTS[start], (BALLS[:1], FLOWS[:1]) if restitution else (BALLS, FLOWS)
-    given = {
-        "settings": Settings(restitution=restitution, initial_impact=True),
-        "sample_interval": 0.1,
-    }
+    settings = Settings(restitution=restitution, initial_impact=True)
+    given = {"settings": settings, "sample_interval": 0.1}
     alone = [simulate(p, x0, 1.5, flow, **given) for p, flow in zip(balls, flows, strict=True)]
     many = simulate_many(balls, x0, 1.5, flows, threads=2, **given)
     assert np.all(many.end == 1.5)

@@ -41,9 +41,8 @@ def test_newton_closes_the_orbit(hop, swing):
     it was."""
     for orbit in (hop, swing):
         assert orbit.steps <= 8
-        run = simulate(
-            orbit.p, orbit.loop.x, 5 * orbit.period, sample_interval=orbit.period, rtol=1e-11
-        )
+        how = {"sample_interval": orbit.period, "rtol": 1e-11}
+        run = simulate(orbit.p, orbit.loop.x, 5 * orbit.period, **how)
         away = np.abs(run.x - orbit.loop.x) / state_units(orbit.p)
         # Each period adds about the defect and the tolerance, of which every disturbance dies out.
         assert away.max() < 5 * (orbits.CLOSED + 1e-9)
@@ -62,9 +61,8 @@ def test_multipliers_are_how_disturbances_change(hop, swing):
         left = np.linalg.matrix_power(orbit.derivative, 2) @ push
         away = orbit.loop.coordinates(back.x - orbit.loop.x)
         assert np.abs(away - left).max() < 0.01 * np.abs(left).max()
-        np.testing.assert_allclose(
-            np.poly(orbit.multipliers), np.poly(orbit.derivative), rtol=1e-9, atol=1e-12
-        )
+        polynomial = np.poly(orbit.derivative)
+        np.testing.assert_allclose(np.poly(orbit.multipliers), polynomial, rtol=1e-9, atol=1e-12)
 
 
 def test_a_branch_ends_at_the_range(hop):
@@ -110,9 +108,8 @@ def test_no_torus_attracts_beyond_the_torus_bifurcation(hop, eta, faster, hops):
     assert orbit.p.eta == pytest.approx(eta)
     assert orbit.stable is (eta < 0.0913)
     x = State.of(orbit.loop.x)
-    run = simulate(
-        orbit.p, x._replace(omega_c=x.omega_c * (1 + faster)).stacked(), 300.0, sample_interval=1.0
-    )
+    pushed = x._replace(omega_c=x.omega_c * (1 + faster))
+    run = simulate(orbit.p, pushed, 300.0, sample_interval=1.0)
     assert bool((run.events.time > 290.0).any()) is hops
     if not hops:
         assert run.cases[-1] is Case.NR
@@ -166,13 +163,11 @@ def test_lyapunov_exponent_of_a_known_growth():
 
     def run(p, x0s, duration, interval):
         whole, growth = SimpleNamespace(failure=""), np.exp(0.3 * duration)
-        return [
-            SimpleNamespace(x=np.array([x, x * growth]), case=[Case.NN], header=whole) for x in x0s
-        ]
+        paths = (np.array([x, x * growth]) for x in x0s)
+        return [SimpleNamespace(x=path, case=[Case.NN], header=whole) for path in paths]
 
-    assert limits.lyapunov(HOPPING, np.zeros(8), Case.NN, 20.0, 0.5, run) == pytest.approx(
-        (0.3, 0.0), abs=1e-6
-    )
+    found = limits.lyapunov(HOPPING, np.zeros(8), Case.NN, 20.0, 0.5, run)
+    assert found == pytest.approx((0.3, 0.0), abs=1e-6)
 
 
 @pytest.mark.slow
@@ -181,24 +176,18 @@ def test_recurrent_motions_that_do_not_close(exponent, kind, monkeypatch):
     """omega_c and the slips go round at two rates whose ratio is the golden one: neighbours decide,
     in three errors."""
     monkeypatch.setattr(limits, "lyapunov", lambda *motion, run: (exponent, 0.1))
-    size, rates = (
-        state_units(HOPPING)[2:6],
-        np.array([3.0, 1.5 * (1 + 5**0.5)]) / (HOPPING.R / HOPPING.g) ** 0.5,
-    )
+    size, unit = state_units(HOPPING)[2:6], (HOPPING.R / HOPPING.g) ** 0.5
+    rates = np.array([3.0, 1.5 * (1 + 5**0.5)]) / unit
 
     def run(p, x0s, duration, interval):
         time = np.arange(round(duration / interval) + 1) * interval
         begun = (x0s[:, 2:6] / size).view(complex)
         turned = (begun[:, None] * np.exp(1j * time[:, None] * rates)).view(float) * size
         names = "omega_c", "slip_x", "slip_y", "slip_z"
-        return [
-            motion(p, time, case=Case.SS, **dict(zip(names, each.T, strict=True)))
-            for each in turned
-        ]
+        columns = (dict(zip(names, each.T, strict=True)) for each in turned)
+        return [motion(p, time, case=Case.SS, **each) for each in columns]
 
     start = np.append([0.0, 0.0], [0.5, 0.0, 2.0, 0.0] * size)
-    (only,) = attractors(
-        HOPPING, start, lasting=3 * limits.WINDOW * (HOPPING.R / HOPPING.g) ** 0.5, run=run
-    )
+    (only,) = attractors(HOPPING, start, lasting=3 * limits.WINDOW * unit, run=run)
     assert only.limit.kind is kind
     assert only.limit.exponent == exponent

@@ -40,10 +40,8 @@ def test_figure_12_with_a_floor_that_pulls():
     s = np.linspace(-8.0, 8.0, 65)
     states, fluid = slipping_branch.states(s, P)
     ends = State.of(slipping_branch.states(np.array([-40.0, 40.0]), P)[0])
-    rates = [
-        dynamics.rates(Case.SS, x, P, w)[TURNING]
-        for x, w in zip(states.tolist(), fluid.tolist(), strict=True)
-    ]
+    places = zip(states.tolist(), fluid.tolist(), strict=True)
+    rates = [dynamics.rates(Case.SS, x, P, w)[TURNING] for x, w in places]
     assert np.abs(rates).max() * P.r / P.g == approx(0.0)
     assert not np.any(slipping_branch.branch(s, P).A_y >= 0)
     assert ends.omega_c[0] == approx(float(curves["omega_01"]) * unit)  # P3: slip vanishes
@@ -81,11 +79,8 @@ def test_where_82_and_83_contradict_12():
         square = slip_bounds.rr_to_ss(p, side).zero
         if 0 < square < math.inf:
             omega = math.sqrt(square)
-            A_y, B_x = (
-                float(getattr(dynamics.forces(Case.SS, State(omega_c=omega), p, omega, *each), n))
-                for each, n in (((direction, direction), "A_y"), ((direction, direction), "B_x"))
-            )
-            assert (A_y > 0) == (eta < p.j) if side == 1 else B_x < 0 < eta - 1
+            f = dynamics.forces(Case.SS, State(omega_c=omega), p, omega, direction, direction)
+            assert (f.A_y > 0) == (eta < p.j) if side == 1 else f.B_x < 0 < eta - 1
 
 
 def test_rolling_is_unstable_on_all_sides_beyond_omega_03():
@@ -103,9 +98,8 @@ def test_rolling_is_unstable_on_all_sides_beyond_omega_03():
 
 def test_a_share_is_between_0_and_1_where_slip_dies_out_on_either_side():
     """(69) and (64)."""
-    for mu, eta, lag in product(
-        (0.1, 0.5), np.geomspace(0.05, 2.0, 8), np.linspace(-200.0, 200.0, 41)
-    ):
+    lags = np.linspace(-200.0, 200.0, 41)
+    for mu, eta, lag in product((0.1, 0.5), np.geomspace(0.05, 2.0, 8), lags):
         p = P.replace(mu=mu, eta=eta, omega_0=9.0 + lag)
         dies_out = all(slip_bounds.rr_to_rs(p, 9.0, side).gamma(p.omega_0) < 0 for side in (1, -1))
         assert (0 < slip_bounds.filippov_share(Case.RS, 9.0, p) < 1) == dies_out

@@ -20,9 +20,8 @@ def test_rolling_with_the_torque_obeys_newton_and_euler(name, layer):
     spin = p.R / p.r * at.omega_c * (inwards - up)
     relative = spin - p.omega_0 * up
     inertia = p.j * p.m * p.r**2
-    assert at.Re == pytest.approx(
-        np.linalg.norm(relative) * p.r**2 / p.nu_f if p.nu_f else np.nan, nan_ok=True
-    )
+    Re = np.linalg.norm(relative) * p.r**2 / p.nu_f if p.nu_f else np.nan
+    assert at.Re == pytest.approx(Re, nan_ok=True)
     torque = -inertia * real_fluid.torque_rate(np.linalg.norm(relative), p, layer) * relative
     lag = p.R * (at.omega_c - p.omega_0)
     push = -p.m * drag.coefficient(abs(lag), p) * lag
@@ -31,14 +30,10 @@ def test_rolling_with_the_torque_obeys_newton_and_euler(name, layer):
     assert A_z + B_z + push == pytest.approx(0, abs=1e-9 * push)
     for B_y in (0.0, 0.3 * p.m * p.g):
         A_x = B_y - p.j * p.m * p.R * at.omega_c**2
-        F_A, F_B = (
-            np.array([A_x, p.m * p.g - B_y, A_z]),
-            np.array([p.m * p.R * at.omega_c**2 - A_x, B_y, B_z]),
-        )
+        F_A, F_B = [A_x, p.m * p.g - B_y, A_z], [p.m * p.R * at.omega_c**2 - A_x, B_y, B_z]
         moment = np.cross(-p.r * up, F_A) + np.cross(-p.r * inwards, F_B) + torque
-        np.testing.assert_allclose(
-            moment, np.cross(at.omega_c * up, inertia * spin), atol=1e-9 * np.abs(moment).max()
-        )
+        turning, error = np.cross(at.omega_c * up, inertia * spin), 1e-9 * np.abs(moment).max()
+        np.testing.assert_allclose(moment, turning, atol=error)
 
 
 def test_the_torque_is_of_the_order_of_the_drag_for_every_ball():
@@ -49,9 +44,8 @@ def test_the_torque_is_of_the_order_of_the_drag_for_every_ball():
     stokes = real_fluid.torque_rate(1.0, p, layer=False)
     assert stokes == pytest.approx(8 * np.pi * rho_f * p.nu_f * p.r / (p.j * p.m))
     assert stokes == pytest.approx(10 / 3 * p.c)
-    rates = [
-        real_fluid.torque_rate(Re * p.nu_f / p.r**2, p) / stokes for Re in (7.9, 8.0, 8.1, 2000.0)
-    ]
+    spins = np.array([7.9, 8.0, 8.1, 2000.0]) * p.nu_f / p.r**2
+    rates = [real_fluid.torque_rate(spin, p) / stokes for spin in spins]
     assert rates[:3] == pytest.approx([1.0] * 3, abs=5e-3)
     assert rates[3] == pytest.approx(2000 / (16 * np.pi) * (6.45 / np.sqrt(2000) + 32.1 / 2000))
 
@@ -64,18 +58,12 @@ def test_time_stepping_takes_the_torque_and_the_event_driven_simulation_refuses_
     run = simulate(p, start, 2.0, method="time-stepping", timestep=2e-3)
     assert np.abs(run.omega_c - start.omega_c).max() <= 1e-12
     assert run.cases[-1] is Case.RR
-    thrown = simulate(
-        p,
-        State(y=9.0, h=0.02, slip_x=30.0, slip_y=-40.0),
-        0.2,
-        method="time-stepping",
-        timestep=1e-3,
-    )
+    up = State(y=9.0, h=0.02, slip_x=30.0, slip_y=-40.0)
+    thrown = simulate(p, up, 0.2, method="time-stepping", timestep=1e-3)
     balance = thrown.header.settings
     assert abs(balance["energy_residual"]) < 1e-9 * balance["energy_scale"]
-    with pytest.raises(
-        InputError, match=r"fluid_torque = 3\.33333 s-1: the event-driven simulation leaves"
-    ):
+    says = r"fluid_torque = 3\.33333 s-1: the event-driven simulation leaves"
+    with pytest.raises(InputError, match=says):
         simulate(p, start, 1.0)
 
 

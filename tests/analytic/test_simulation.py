@@ -35,20 +35,17 @@ def assert_lawful(run):
     assert np.all(np.hypot(A_x, A_z) <= p.mu * A_y + TOLERANCE)
     assert np.all(np.hypot(B_y, B_z) <= p.eta * B_x + TOLERANCE)
     assert np.all(np.minimum(run.gap_A, run.gap_B) >= -TOLERANCE * p.R)
-    at_A, at_B = (
-        ("A", run.gap_A, run.slip_speed_A, run.force_A),
-        ("B", run.gap_B, run.slip_speed_B, run.force_B),
-    )
-    for contact, gap, slip, force in (at_A, at_B):
-        state = np.array([getattr(case, contact) for case in run.cases])
+    for point in "AB":
+        columns = (f"gap_{point}", f"slip_speed_{point}", f"force_{point}")
+        gap, slip, force = (getattr(run, name) for name in columns)
+        state = np.array([getattr(case, point) for case in run.cases])
         assert np.all(gap[state != Contact.N] == 0)
         assert np.all(force[state == Contact.N] == 0)
         rolls = state == Contact.R
         assert np.all(slip[rolls] <= 1e-12 * math.sqrt(p.g * p.R) * (1 + weight[rolls]))
     # Motions much slower than sqrt(g R) are integrated to the absolute tolerance.
-    assert run.header.settings["energy_residual"] <= TOLERANCE * (
-        run.header.settings["energy_scale"] + p.m * p.g * p.R
-    )
+    scale = run.header.settings["energy_scale"] + p.m * p.g * p.R
+    assert run.header.settings["energy_residual"] <= TOLERANCE * scale
 
 
 def fault(seed, t_end=5.0):
@@ -129,19 +126,14 @@ def test_the_mirrored_motion(method, torque, x):
     )
     assert len(there.events)
     np.testing.assert_array_equal(back.events.to_case, there.events.to_case)
-    np.testing.assert_allclose(
-        back.x, flip * there.x, rtol=0, atol=1e-7 * np.abs(there.x).max(axis=0).max()
-    )
+    np.testing.assert_allclose(back.x, flip * there.x, rtol=0, atol=1e-7 * np.abs(there.x).max())
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_steps_of_a_long_stretch_tell_progress_which_may_end_the_run(method, monkeypatch):
     """Without a change of case or a sample in between; the run has its samples so far."""
-    for between_two_reports in ("hybrid.STRIDES", "hybrid.STEPS", "time_stepping.AT_ONCE"):
-        monkeypatch.setattr(
-            f"analytic.simulation.{between_two_reports}",
-            10 if "AT_ONCE" in between_two_reports else 3,
-        )
+    for name, few in (("hybrid.STRIDES", 3), ("hybrid.STEPS", 3), ("time_stepping.AT_ONCE", 10)):
+        monkeypatch.setattr(f"analytic.simulation.{name}", few)
     p, x0, seen = P.replace(omega_0=25.0), [0, 0, 13.8, -4, 0.5, 10], []
 
     def enough(done):
@@ -177,10 +169,8 @@ def test_a_speed_into_a_closed_contact(method):
 def test_a_ball_locked_in_the_corner_does_not_rebound(method):
     """Where mu, eta > 1 a fall into the corner has no impulses that meet restitution at both
     contacts."""
-    p, given = (
-        P.replace(mu=1.3, eta=1.3),
-        {"restitution": 0.5, "initial_impact": True, "timestep": 1e-3},
-    )
+    p = P.replace(mu=1.3, eta=1.3)
+    given = {"restitution": 0.5, "initial_impact": True, "timestep": 1e-3}
     run = simulate(p, [0, -0.4, 0, 0, 0, 40, 0, -0.4], 0.05, method=method, **given)
     assert np.all(run.x[1:, [0, 1, 6, 7]] == 0)
 
@@ -205,40 +195,27 @@ def test_the_end_is_always_a_sample():
     the last digit."""
     p, frequency = P.replace(omega_0=11.5), 6.550213947459355
     flow = Flow.sine(11.5, 8.0 * (1 + 2 * frequency), frequency)
-    run = simulate(
-        p, [0, 0, 11.8, 0, 0, 0], 1 / frequency, flow, rtol=1e-6, sample_interval=1 / frequency
-    )
-    assert run.time.tolist() == [0.0, 1 / frequency]
+    period = 1 / frequency
+    run = simulate(p, [0, 0, 11.8, 0, 0, 0], period, flow, rtol=1e-6, sample_interval=period)
+    assert run.time.tolist() == [0.0, period]
 
 
 @pytest.mark.parametrize(
-    ("omega_c", "given"),
+    ("omega_c", "values"),
     [
-        (
-            (-3.9, -3.4),
-            {"r": 0.024, "j": 0.653, "mu": 0.5, "eta": 0.349, "c": 0.42, "omega_0": 59.6},
-        ),
-        (
-            (5.0, 20.0),
-            {"r": 0.00224, "j": 0.515, "mu": 0.208, "eta": 1.028, "c": 3.59, "omega_0": 41.0},
-        ),
+        ((-3.9, -3.4), (0.024, 0.653, 0.5, 0.349, 0.42, 59.6)),
+        ((5.0, 20.0), (0.00224, 0.515, 0.208, 1.028, 3.59, 41.0)),
     ],
 )
-def test_a_step_in_which_friction_only_just_holds_the_ball(omega_c, given):
+def test_a_step_in_which_friction_only_just_holds_the_ball(omega_c, values):
     """Where rolling ends two solutions of Coulomb's law meet: a bisection comes as near to that as
     numbers go."""
+    given = dict(zip(("r", "j", "mu", "eta", "c", "omega_0"), values, strict=True))
     p, dt, (rolls, slips) = P.replace(**given), 1e-3, omega_c
     while abs(rolls - slips) > 4e-16 * abs(slips):
         middle = (rolls + slips) / 2
-        rolling = (
-            State(omega_c=middle),
-            0.0,
-            p,
-            Flow.steady(p.omega_0),
-            Settings(),
-            np.array([0.0, dt]),
-        )
-        ball, _, constants = prepared(*rolling)
+        flow, times = Flow.steady(p.omega_0), np.array([0.0, dt])
+        ball, _, constants = prepared(State(omega_c=middle), 0.0, p, flow, Settings(), times)
         after = step(ball, dt, p.omega_0, constants)
         assert after.residual == 0
         rolls, slips = (middle, slips) if after.case == Case.RR else (rolls, middle)
@@ -247,9 +224,8 @@ def test_a_step_in_which_friction_only_just_holds_the_ball(omega_c, given):
 def test_settles_on_random_sets():
     """Every step of 200 runs converges."""
     sets, x0s = zip(*map(random_start, range(200)), strict=True)
-    many = simulate_many(
-        sets, x0s, 0.5, settings=Settings(method="time-stepping"), sample_interval=0.5
-    )
+    settings = Settings(method="time-stepping")
+    many = simulate_many(sets, x0s, 0.5, settings=settings, sample_interval=0.5)
     assert many.failure == ("",) * 200
 
 
@@ -270,9 +246,8 @@ def test_no_convergence_keeps_the_samples():
     assert len(kept.time) > 1
     assert np.all(np.isfinite(kept.x))
     # Among many at once it leaves the others alone.
-    many = simulate_many(
-        [P.replace(omega_0=5.0), p], x0, 0.2, settings=settings, sample_interval=0.1
-    )
+    sets = P.replace(omega_0=5.0), p
+    many = simulate_many(sets, x0, 0.2, settings=settings, sample_interval=0.1)
     assert many.failure[0] == ""
     assert "a shorter step" in many.failure[1]
     assert np.all(np.isfinite(many.x[0]))

@@ -49,9 +49,8 @@ def greatest(gamma, x, p, closed=False):
     grid = directions()
     values = growth(grid)
     best, scale = grid[np.argmax(values)], values.max()
-    polished = minimize(
-        lambda n: -float(gamma(x, n, p)) / abs(scale), best, method="BFGS", options={"gtol": 1e-9}
-    ).x
+    how = {"method": "BFGS", "options": {"gtol": 1e-9}}
+    polished = minimize(lambda n: -float(gamma(x, n, p)) / abs(scale), best, **how).x
     best = max(best, polished, key=growth)
     return best / np.linalg.norm(best), float(growth(best))
 
@@ -109,15 +108,12 @@ def test_both_consistent_between_73_and_the_cone():
     p, omega_c = P.replace(mu=0.9, eta=1e6), 9.0
     T = p.mu * (1 - p.j * p.R * omega_c**2 / p.g)
     lag = T * (1 + 2 * p.j) * p.g / (p.j * p.c * p.R)
-    for factor, slips, sticks in (
-        (0.99, False, True),
-        (1.01, True, True),
-        (1.01 / np.sqrt(1 - p.mu**2), True, False),
-    ):
+    beyond = 1.01 / np.sqrt(1 - p.mu**2)
+    table = (0.99, False, True), (1.01, True, True), (beyond, True, False)
+    for factor, slips, sticks in table:
         q = p.replace(omega_0=omega_c + factor * lag)
-        growths = [
-            slip.gamma(Case.RR, Case.SR, State(omega_c=omega_c), [side], q) for side in (1.0, -1.0)
-        ]
+        x = State(omega_c=omega_c)
+        growths = [slip.gamma(Case.RR, Case.SR, x, [side], q) for side in (1.0, -1.0)]
         assert (max(growths) > 0) == slips
         assert (rolling_forces.margin(omega_c, q) >= 0) == sticks
 
@@ -136,9 +132,5 @@ def test_definition_3_without_friction_or_flow():
     assert stationary_solutions(still)[0].slip_stability is SlipStability.NEUTRAL
     for neutral in (still, slow.replace(eta=0.0), slow.replace(eta=0.6, mu=0.0)):
         assert stability(Case.RR, neutral) is SlipStability.NEUTRAL
-    assert (
-        stability(Case.RS, still)
-        is stability(Case.SS, P)
-        is stability(Case.NS, P)
-        is SlipStability.STABLE
-    )
+    for case, p in ((Case.RS, still), (Case.SS, P), (Case.NS, P)):
+        assert stability(case, p) is SlipStability.STABLE

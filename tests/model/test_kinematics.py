@@ -45,9 +45,8 @@ def test_to_the_world_and_back(unit, theta):
 def test_rotation_by_a_quaternion(vector, q):
     quaternion = np.roll(q, 1) / np.linalg.norm(q)
     expected = Rotation.from_quat(quaternion, scalar_first=True).apply(vector)
-    np.testing.assert_allclose(
-        rotated(quaternion, np.array(vector)), expected, atol=64 * EPS * (1 + max(map(abs, vector)))
-    )
+    error = 64 * EPS * (1 + max(map(abs, vector)))
+    np.testing.assert_allclose(rotated(quaternion, np.array(vector)), expected, atol=error)
 
 
 @given(states, angles)

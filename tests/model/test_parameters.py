@@ -55,9 +55,8 @@ def test_a_law_of_drag_beside_a_fluid(tmp_path, law):
 
 def test_drag_and_gravity_follow_from_the_fluid():
     nu, rho_f, rho_b, r = 1e-6, 1000.0, 8000.0, 0.002
-    p = Parameters.from_fluid(
-        nu_f=nu, rho_f=rho_f, rho_b=rho_b, r=r, R=0.02, mu=0.1, eta=0.1, gravity=9.8
-    )
+    fluid = {"nu_f": nu, "rho_f": rho_f, "gravity": 9.8}
+    p = Parameters.from_fluid(rho_b=rho_b, r=r, R=0.02, mu=0.1, eta=0.1, **fluid)
     # Stokes: F = 6 pi rho_f nu r v = m c v.
     assert p.m * p.c == pytest.approx(6 * math.pi * rho_f * nu * r, rel=1e-14)
     # Archimedes: weight less the weight of the displaced fluid.

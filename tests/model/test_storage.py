@@ -17,18 +17,8 @@ import pandas
 import pytest
 import xarray
 
-from model import (
-    Case,
-    Events,
-    Flow,
-    Header,
-    InputError,
-    Parameters,
-    StorageError,
-    Trajectory,
-    storage,
-    versions,
-)
+from model import Case, Events, Flow, Header, Parameters, Trajectory, storage, versions
+from model.errors import InputError, StorageError
 from model.files import write_text
 from model.hdf5 import sealed
 from model.trajectory import SAMPLE, columns
@@ -38,9 +28,8 @@ def make(n=50, events=2, failure=""):
     rng = np.random.default_rng(0)
     samples = np.empty(n, SAMPLE)
     for name in columns(Trajectory):
-        samples[name] = (
-            rng.normal(size=samples[name].shape) if name != "case" else rng.integers(0, 9, n)
-        )
+        shape = samples[name].shape
+        samples[name] = rng.integers(0, 9, n) if name == "case" else rng.normal(size=shape)
     header = Header(
         engine="event",
         parameters=Parameters.named("steel-in-water").replace(drag="quadratic", C_D=0.5),
@@ -98,9 +87,8 @@ def test_xarray_sees_axes_units_and_cases_in_a_file_and_in_memory(tmp_path, n, e
     names = data.case.flag_meanings.split()
     assert [names[code] for code in data.case.values] == [case.name for case in trajectory.cases]
     parameters = dataclasses.asdict(trajectory.header.parameters)
-    assert (
-        json.loads(data.parameters) == parameters == {name: data.attrs[name] for name in parameters}
-    )
+    assert json.loads(data.parameters) == parameters
+    assert {name: data.attrs[name] for name in parameters} == parameters
     with h5py.File(tmp_path / "run.h5") as file:  # without xarray, too
         assert h5py.check_enum_dtype(file["case"].dtype) == {case.name: case.value for case in Case}
 
@@ -117,9 +105,8 @@ def test_without_the_library_it_is_named(monkeypatch, library, needed):
 def test_a_table_has_a_row_for_each_sample_in_pandas_and_in_xarray(tmp_path):
     """Which reads it by the entry point that it looks up where dualball is installed."""
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
-    backend = EntryPoint(
-        "dualball", project["entry-points"]["xarray.backends"]["dualball"], ""
-    ).load()
+    place = project["entry-points"]["xarray.backends"]["dualball"]
+    backend = EntryPoint("dualball", place, "").load()
     trajectory = make(50, 2)
     expected = trajectory.to_pandas()
     assert expected.index.name == "time"
@@ -136,16 +123,12 @@ def test_a_table_has_a_row_for_each_sample_in_pandas_and_in_xarray(tmp_path):
             assert run.force_Ay.units == "N"
             assert run.attrs["mu"] == trajectory.header.parameters.mu
             run.to_netcdf(tmp_path / "copy.nc")
-        pandas.testing.assert_frame_equal(
-            table, expected.astype({"case": table.case.dtype})[table.columns]
-        )
+        alike = expected.astype({"case": table.case.dtype})[table.columns]
+        pandas.testing.assert_frame_equal(table, alike)
     with xarray.open_dataset(tmp_path / "run.h5", engine=backend, drop_variables="theta") as run:
         assert "theta" not in run
-    for path, message in (
-        ("text.h5", "text.h5"),
-        ("none.h5", "none.h5"),
-        ("batch.h5", "name one of them"),
-    ):
+    said = {"text.h5": "text.h5", "none.h5": "none.h5", "batch.h5": "name one of them"}
+    for path, message in said.items():
         with pytest.raises(StorageError, match=message):
             xarray.open_dataset(tmp_path / path, engine=backend)
     with pytest.raises(InputError, match="by its name, not a BytesIO"):
@@ -173,15 +156,11 @@ for size in (0, 40, 900, 3000, 20_000, 60_000, 90_000):
 def test_a_disk_that_fills_at_any_moment(tmp_path):
     """In a process of its own, which HDF5 might crash; a limit on the size of files plays the
     disk."""
-    program, here = (
-        [sys.executable, "-c", FULL, str(tmp_path / "run.h5")],
-        Path(__file__).parents[2],
-    )
+    path, here = tmp_path / "run.h5", Path(__file__).parents[2]
+    program = [sys.executable, "-c", FULL, str(path)]
     answer = subprocess.run(program, cwd=here, capture_output=True, text=True, check=True)
     assert answer.stderr == ""
-    assert (
-        answer.stdout.splitlines() == [f"cannot write {tmp_path / 'run.h5'}: File too large"] * 14
-    )
+    assert answer.stdout.splitlines() == [f"cannot write {path}: File too large"] * 14
     assert list(tmp_path.iterdir()) == []
 
 
