@@ -88,8 +88,7 @@ def write_text(path: Path, text: str) -> None:
 
 @contextmanager
 def reading_json(path: Path, what: str) -> Iterator[Any]:
-    """The object that a JSON file holds; an error within the context is a `StorageError` that says
-    it isn't what it should be."""
+    """The object that a JSON file holds; an error within the context is a `StorageError` of it."""
     try:
         if not isinstance(content := json.loads(path.read_text("utf-8")), dict):
             raise TypeError("it is no JSON object")

@@ -58,8 +58,7 @@ class Flow:
         return np.asarray(self.value[k] + self.slope[k] * np.maximum(t - self.start[k], 0.0))
 
     def knots(self, t_end: float) -> Array:
-        """Times in s between 0 and t_end at which omega_0 or its slope jumps: an integrator should
-        stop there."""
+        """Times, s, in (0, t_end) at which omega_0 or its slope jumps: integrators stop there."""
         return self.start[(self.start > 0) & (self.start < t_end)]
 
     @property

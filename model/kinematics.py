@@ -25,8 +25,7 @@ from model.parameters import Parameters, Range, check_number
 class State(NamedTuple):
     """The state (19) of a ball, or its rate: floats, or arrays of one shape for many states.
 
-    A tuple of eight, which is taken wherever a state is asked for: ``State(omega_c=3.0,
-    slip_x=-1.0)``."""
+    A tuple, taken wherever a state is asked for: ``State(omega_c=3.0, slip_x=-1.0)``."""
 
     y: Real = 0.0
     """Gap at A, m."""
@@ -45,8 +44,7 @@ class State(NamedTuple):
 
     @classmethod
     def of(cls, x: npt.ArrayLike) -> State:
-        """The state in a sequence of 6 or 8 numbers, as floats, or the states in an array (..., 6
-        or 8), as columns.
+        """The state of 6 or 8 numbers, as floats, or states of an array (..., 6 or 8), as columns.
 
         A `State` is returned as it is. Raises `InputError` as `full_state`."""
         if isinstance(x, State):

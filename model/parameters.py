@@ -27,8 +27,7 @@ _SETS = Path(__file__).parent / "parameter_sets"
 
 @dataclass(frozen=True)
 class Range:
-    """The numbers from `low` to `high`: without `low` if `open`, without `high` if `below`, only
-    whole if `whole`."""
+    """From `low` to `high`: without `low` if `open`, without `high` if `below`; perhaps `whole`."""
 
     low: float = -math.inf
     high: float = math.inf

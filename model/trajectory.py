@@ -169,8 +169,7 @@ class Trajectory:
         return xarray.load_dataset(content, engine="h5netcdf")
 
     def table(self) -> dict[str, Array]:
-        """Everything that a sample holds, number by number: forces split along `AXES` (force_Ax …),
-        each shape (n,)."""
+        """All that a sample holds by number, each (n,): forces split along `AXES` (force_Ax …)."""
         return {name: component(self, name) for name in COMPONENTS} | {"omega_0": self.omega_0}
 
     def to_pandas(self) -> pandas.DataFrame:
@@ -235,8 +234,7 @@ COMPONENTS: dict[str, tuple[str, str]] = {
     for name, meta in _SAMPLED
     for axis in (AXES if meta["shape"] else ("",))
 }
-"""What a sample holds, number by number: the columns, forces once along each of the `AXES`
-(force_Ax ...)."""
+"""What a sample holds, by number: columns, forces along each of the `AXES` (force_Ax …)."""
 
 
 def component(of: Any, name: str) -> Array:

@@ -79,8 +79,7 @@ def curves_without_drag(
 def number_of_folds(p: Parameters) -> int:
     """Folds along the branch of SS, counted: by Proposition 7 one for eta_cr < eta < j, else none.
 
-    By the changes of sign of `slope`, a search that assumes nothing. `InputError` as
-    `check_branch`."""
+    By the changes of sign of `slope`, which assumes nothing. `InputError` as `check_branch`."""
     check_branch(p)
     places = np.linspace(-slipping_branch.END, slipping_branch.END, 20_001)
     values = slipping_branch.slope(places, p)
@@ -159,8 +158,7 @@ def case_map(
     mu, eta : 1-D, of one length (Fig. 8) or mu a number (Fig. 7)
     omega_0 : 1-D, rad s-1, of either sign
 
-    RR counts where it is stable with respect to slipping; for mu > 1 it may also jam beyond that,
-    see `rolling_forces`."""
+    RR counts where no slip grows; for mu > 1 it may also jam beyond that, see `rolling_forces`."""
     Omega = np.abs(np.asarray(omega_0, dtype=float)) / np.sqrt(p.g / p.R)
     eta = np.asarray(eta, dtype=float)
     curves = {name: value[:, None] for name, value in threshold_curves(p, mu, eta).items()}

@@ -81,8 +81,7 @@ def characteristic_slope(p: Parameters, case: Case | None = None) -> float:
 
     Parameters
     ----------
-    case : which attractor; needed between omega_02 and omega_04 only, where SS lags and SR and NR
-        don't
+    case : which attractor; needed from omega_02 to omega_04, where SS lags, SR and NR don't
 
     Raises `InputError` if there is no attractor (of that case), or if `case` is needed."""
     followed = stationary.stable_solutions(p) if case is None else [stationary.solution(p, case)]

@@ -85,8 +85,7 @@ def corners(make: Make, at: Values, tolerances: Values) -> Iterator[Parameters]:
     """The meter with every value at an end of its relative tolerance: x (1 - t) or x (1 + t).
 
     Limits and readings are monotonic in friction and size, but for a ridge of the operating limit
-    at eta = j; so their extremes over all that the tolerances allow are at corners. A test samples
-    between them."""
+    at eta = j; so their extremes within the tolerances are at corners."""
     wide = {name: t for name, t in tolerances.items() if t > 0}
     inexact = {name: (at[name] * (1 - t), at[name] * (1 + t)) for name, t in wide.items()}
     for values in itertools.product(*inexact.values()):
@@ -167,8 +166,7 @@ def best(
     margin has a ridge at eta = j; the seed determines the result. `tell` is called with the
     fraction done: of the decades by which the meters that compete are still to come together.
 
-    Raises `InputError` if no meter within the bounds answers so fast; the message says how fast one
-    can."""
+    Raises `InputError` if no meter within the bounds answers so fast, and says how fast one can."""
     # here, because `predict` shall not wait for it
     from scipy.optimize import Bounds, differential_evolution
 

@@ -82,8 +82,7 @@ def fits(p: Parameters, flow: Array, read: Array) -> list[Fit]:
 
 
 def deviations(p: Parameters, omega_0: Array, omega_c: Array) -> Array:
-    """How far readings (n,) are from theory's curve, and how far their flows lie beyond its ends,
-    as logarithms, (2, n).
+    """How far readings (n,) are from theory's curve, and flows beyond its ends; logarithms (2, n).
 
     Where the curve is steep the deviation along the flow counts, as the lesser one. Where two
     motions attract (Fig. 13) the reading may be of either: the nearer one counts."""

@@ -1,8 +1,7 @@
 """What a real fluid does beside the drag (9): its torque on the ball, and more drag near a wall.
 
 The paper leaves both out, and so do the simulators; added mass and the pressure of the swirl are in
-`bifurcation.diagram`. They are estimates of how far the model can be trusted, for a ball far from
-others.
+`bifurcation.diagram`. They are estimates of how far to trust the model for a ball alone.
 
 A sphere that turns at w relative to the fluid feels the torque -j m r^2 k(|w|) w. By Stokes k = 8
 pi rho_f nu_f r/(j m), which (10) makes 4 c/(3 j), whatever the ball. From Re = |w| r^2/nu_f = 8 on
@@ -94,8 +93,7 @@ def rolling(p: Parameters, layer: bool = True) -> Rolling:
 def model_error(p: Parameters) -> float:
     """Relative error of the model, without the fluid's torque and inertia; 0 if it isn't known.
 
-    The larger of what Stokes and the boundary layer say, or the largest shift by the fluid's
-    inertia if that is more."""
+    By Stokes, by the boundary layer, or by the fluid's inertia, whichever is the largest."""
     if not (p.nu_f or p.fluid_torque):
         return 0.0
     shifts = [rolling(p, layer).shift for layer in (False, True)]

@@ -14,8 +14,7 @@ law is
 
     A = project(a - C B, mu),  B = project(b - C A, eta),
 
-where a and b are what A and B need to meet their targets and to rest if the other one gives
-nothing.
+where a and b are what A and B need to meet their targets and rest if the other gives nothing.
 
 A sweep computes A from B and B from that (projected Gauss-Seidel); what is sought is an impulse at
 B that a sweep f reproduces. Newton's method on the change of a sweep settles most problems in one
@@ -84,8 +83,7 @@ RESTS, ABSENT = Closed(), Closed(closed=False)
 
 
 class Friction(NamedTuple):
-    """Friction of one contact; its direction of slip is that of (s, t) if that isn't (0, 0), else
-    to be found."""
+    """Friction of one contact; its slip is along (s, t), or to be found if that is (0, 0)."""
 
     coefficient: float
     s: float

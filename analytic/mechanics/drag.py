@@ -4,8 +4,7 @@ With Re = 2 r |w|/nu_f every law is one formula, c(|w|) = max(linear + wake |w|^
 Stokes' has the first term alone, the quadratic one the last. So c never decreases with |w|, and a
 drag force determines the speed.
 
-The laws take floats or arrays, and complex ones for derivatives by complex steps. `simulation`
-compiles `rate` and the fall."""
+Laws take floats or arrays, complex ones, too. `simulation` compiles `rate` and the fall."""
 
 from __future__ import annotations
 

@@ -40,14 +40,12 @@ def vector_field(
     Parameters
     ----------
     x : states, shape (..., 6) or (..., 8), see `model.kinematics`
-    omega_0 : angular velocity of the fluid in rad s-1 if it isn't ``p.omega_0``; broadcast against
-        (...)
+    omega_0 : of the fluid in rad s-1 if it isn't ``p.omega_0``; broadcast against (...)
 
     Returns
     -------
     Array
-        dx/dt, shape of x. Whether the contact forces are admissible is not checked, see
-        `contact_forces`.
+        dx/dt, shape of x. Whether forces are admissible is not checked, see `contact_forces`.
 
     Raises `InputError` if x isn't a state of the case (`check_state`)."""
     case = Case(case)
@@ -64,8 +62,7 @@ def contact_forces(
     the forces are a one-parameter family; this is the member of least friction utilisation
     (`rolling_forces.least_utilisation`).
 
-    Parameters and errors are those of `vector_field`; also `InputError` for a state of RR that no
-    forces can hold."""
+    Parameters and errors as of `vector_field`; also `InputError` for RR that no forces can hold."""
     case = Case(case)
     state, fluid = _checked(case, x, p, omega_0)
     if case is Case.RR:
@@ -298,8 +295,7 @@ def _refuse(wrong: Real, values: Real, name: str, rule: str, unit: str | None = 
 def jacobian(case: Case, x: npt.ArrayLike, p: Parameters) -> Array:
     """Exact Jacobians of the vector field at states x (..., 6 or 8), shape (..., d, d), rad s-1.
 
-    Rows and columns are the active variables of the case, ``TRAITS[case].active``; in RN slip_z
-    moves with v_h."""
+    Rows and columns are ``TRAITS[case].active``; in RN slip_z moves with v_h."""
     state = check_state(case, x, p)
     active = TRAITS[case].active
     columns = []

@@ -43,8 +43,7 @@ def admissible_interval(
 def margin(omega_c: npt.ArrayLike, p: Parameters, omega_0: npt.ArrayLike | None = None) -> Array:
     """How far RR is from its end: >= 0 exactly where both cones can hold, continuous through 0.
 
-    The smallest of three lengths in units of m g: the slack of either cone alone, and the overlap
-    of the two intervals of B_y."""
+    The least of three, in units of m g: slack of either cone alone, overlap of both intervals."""
     u, z = _loads(omega_c, p, omega_0)
     least, greatest = _interval(u, z, p)
     unbounded = np.isneginf(greatest)
@@ -71,8 +70,7 @@ def slip_margin(
 
 
 def _last_share(u: Array, z: Array, p: Parameters) -> Array:
-    """B_y in units of m g at which RR ends: the most that the wall's cone allows, up to j u, which
-    turns the spin axis.
+    """B_y in units of m g at which RR ends: what the wall's cone allows, up to j u.
 
     0 where the cone has nothing left, beyond (66)."""
     k = (1 + p.j) * u
@@ -144,8 +142,7 @@ def _interval(u: Array, z: Array, p: Parameters) -> tuple[Array, Array]:
 def _normal_forces(d: Array, z: Array, friction: float) -> tuple[Array, Array]:
     """Roots s of (d - s)^2 + z^2 = friction^2 s^2, which bound the normal forces of a contact.
 
-    Where no s is admissible the discriminant is taken as 0, or both ends are inf: there `margin` is
-    negative."""
+    Where none is admissible the discriminant is taken as 0, or both are inf: there `margin` < 0."""
     hyp2 = d**2 + z**2
     top = d + np.sqrt(np.maximum((friction - 1) * (friction + 1) * z**2 + (friction * d) ** 2, 0.0))
     low = np.where(hyp2 == 0, 0.0, np.where(top > 0, hyp2 / np.where(top > 0, top, 1.0), np.inf))

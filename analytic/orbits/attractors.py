@@ -147,8 +147,7 @@ def attractors(
     run : the simulator that carries out the runs
     progress : called with the share of the starts that came to an attractor, from time to time
 
-    Raises `InputError` if a start is outside of the vessel, a number out of range, or c = 0 without
-    `lasting`."""
+    Raises `InputError` if a start or a number is out of range, or c = 0 without `lasting`."""
     check_type("p", p, Parameters)
     states = (
         random_starts(p, starts, seed)
@@ -185,8 +184,7 @@ def _follow_to_attractor(
 ) -> Generator[Array, Trajectory, LimitSet]:
     """Decide which attractor the motion from x approaches within `lasting` seconds.
 
-    A generator: it yields the state from which it needs the next window of the run, is sent that,
-    and returns the limit set.
+    A generator: it yields where it needs the next window from, is sent that, returns the limit set.
 
     Stationary is what hardly moves, and less than before. Where two windows are alike the motion is
     recurrent: it has the limit set of one of the `known` groups, or closes; if it does neither, its

@@ -30,8 +30,7 @@ from model.kinematics import VARIABLES, state_units
 RETURN_RTOL = 1e-12
 """Relative tolerance of the simulation under the return map."""
 SHIFT = 3e-5
-"""Half width of the differences divided by the extent of the orbit: truncation and RETURN_RTOL
-leave less than 1e-6."""
+"""Half width of differences relative to the orbit: truncation and RETURN_RTOL leave 1e-6."""
 CLOSED = 1e-10
 """Defect in natural units at which an orbit is closed."""
 ITERATIONS = 8
@@ -41,8 +40,7 @@ FAST = 10.0
 RESTITUTION = "restitution"
 """What an orbit may be followed in beside parameters."""
 ORBIT_SAMPLES = 4000
-"""Samples of a period from which means and extremes are taken: a parabola's top is then good to
-1e-6 of its height."""
+"""Samples of a period for means and extremes: a parabola's top is good to 1e-6 of its height."""
 
 Changes = tuple[tuple[Case, Case], ...]
 """Changes of case in order, (before, after)."""
@@ -252,8 +250,7 @@ def refine(p: Parameters, x: npt.ArrayLike, period: float, restitution: float = 
     `restitution` as in `Settings`. The guess may be off by some percent of the orbit.
 
     Raises `NoOrbitError` if Newton's method does not converge to `CLOSED` within `ITERATIONS`
-    steps, or the ball doesn't come back from beside the orbit, so that the return map has no
-    derivative."""
+    steps, or the ball doesn't come back from beside the orbit, for a derivative."""
     return closed_orbit(Loop.of(p, x, period, restitution))
 
 

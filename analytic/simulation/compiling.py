@@ -1,7 +1,6 @@
 """Compiling by numba.
 
-`mjsim.coulomb` has a helper of its own: theory imports nothing of it, and its wheel has no
-theory."""
+`mjsim.coulomb` has its own: theory imports nothing of it, and its wheel has no theory."""
 
 from __future__ import annotations
 

@@ -11,8 +11,7 @@ horizontal motion is kept in complex numbers: position Z = rho e^(i theta), and 
 paper's i, k becomes e^(i theta)(-a + i b); coordinates are their real and imaginary parts. The spin
 about the vertical never changes.
 
-The first coordinate is the azimuth, or Z, the last one the work of drag and friction, J.
-Compiled, like `equations`."""
+The first is the azimuth, or Z, the last the work of drag and friction, J. Compiled."""
 
 from __future__ import annotations
 
@@ -76,8 +75,7 @@ def _begin_on_wall(case: int, at: HybridState, k: System, z: Any, scale: Any) ->
 def _begin_off_wall(
     case: int, at: HybridState, k: System, z: Any, scale: Any
 ) -> tuple[System, int]:
-    """As `begin`: z = (Z, dZ/dt; in SN speed and direction of the lowest point at rest; in NN y,
-    v_y; work).
+    """z = (Z, dZ/dt; in SN speed, direction of the lowest point at rest; in NN y, v_y; work).
 
     In RN the spin follows; in NN all of it rests, and with Stokes' drag the fall is known
     (`drag.fall`). With another law c depends on all components of the velocity."""

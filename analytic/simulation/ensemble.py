@@ -65,8 +65,7 @@ def simulate_many(
         rest
     threads : number of threads, that of the cores if None
 
-    Raises `InputError` if numbers of runs differ, or as `simulate` for the first run that can't
-    start."""
+    Raises `InputError` if numbers of runs differ, or as `simulate` for a run that can't start."""
     settings = settings or Settings()
     sets = list(parameters) if isinstance(parameters, Sequence) else [parameters]
     starts = np.atleast_2d(full_state(x0s))
@@ -125,8 +124,7 @@ def simulate_many(
 def random_starts(p: Parameters, count: int, seed: int = 0) -> Array:
     """States (count, 8) at the wall, half on the floor, half up to R above it, speeds to sqrt(g R).
 
-    omega_c is up to twice omega_0 either way, slips up to what rolling at twice omega_0 is; all
-    evenly spread."""
+    omega_c is up to twice omega_0 either way, slips as of rolling at that; all evenly spread."""
     check_number("starts", count, "runs", Range(1, whole=True))
     check_number("seed", seed, "1", Range(0, whole=True))
     rng = np.random.default_rng(seed)

@@ -2,8 +2,7 @@
 
 At the wall the forces are those of (21) to (29), and the rates those of Newton and Euler (20) with
 h = 0; away from it both are written in the resting frame. `dynamics` has them for arrays of states,
-and test_coordinates holds these against it. A function writes what it finds into a list or an array
-that it is given."""
+and test_coordinates holds these against it. What is found is written into a list or an array."""
 
 from __future__ import annotations
 
@@ -40,11 +39,9 @@ FINER = 1e3
 LOCAL = 0.25
 """Tolerance of a step relative to that asked for: errors of many steps add up."""
 ONSET_SLIP, SMALL_SLIP = 1e-7, 1e-2
-"""Slip that has just set in, and below which its direction may be stiff, relative to the spin of
-rolling at sqrt(g R). """
+"""Slip at its onset, and where its direction may be stiff, relative to rolling at sqrt(g R)"""
 STIFF_STEPS = 300
-"""Steps with a small slip after which a stiff method takes over; a slip that dies out takes
-fewer."""
+"""Steps with a small slip after which a stiff method takes over; to die out takes fewer."""
 STABILITY, FEASIBILITY = range(2)
 """What `Settings.leave_rolling` asks of RR: that slip dies out, or only that forces hold it."""
 

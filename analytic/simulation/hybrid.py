@@ -52,8 +52,7 @@ def _state_parts(at: HybridState) -> tuple[Any, ...]:
 def follow(
     case: int, at: HybridState, until: float, k: System, run: Rows, steps: int
 ) -> tuple[int, HybridState]:
-    """Follow one case to the first guard, up to a time, or for so many steps: what ended it, and
-    the hybrid state then."""
+    """Follow a case to a guard, a time, or for so many steps: what ended it, and the state then."""
     room = np.empty((6, coordinates.MOST))
     k, n = coordinates.begin(case, at, k, room[0], room[1])
     z, scale, rate, count = room[0, :n], room[1, :n], room[2, :n], coordinates.count_guards(k)
@@ -123,8 +122,7 @@ def _keep_event(
 def run_through_flow(
     stage: Stage, k: System, pieces: Any, run: Rows, strides: int, steps: int
 ) -> tuple[Any, ...]:
-    """Follow a run to its last sample, to where it is stopped, or for some strides: whether it is
-    over, and its stage.
+    """Follow a run to its last sample or stop, or for some strides: is it over, and its stage.
 
     The stage is in parts, plain tuples: a signal would be answered while numba makes named ones,
     which doesn't look whether it has got them.

@@ -58,8 +58,7 @@ def finish_straight(t: float, of: Stretch, taken: int) -> int:
 
 
 def stretch(of: Stretch, pace: Pace, taken: int, most: int) -> tuple[int, Pace, int, int]:
-    """Integrate a case for at most so many steps: why that ended, the pace, the guard, and how many
-    samples are taken."""
+    """Integrate a case for so many steps at most: why it ended, pace, guard, and samples taken."""
     start, tau, h, small, slow = pace
     why, left = OTHER, most
     while why == OTHER or (why == PAUSED and left > 0):

@@ -164,8 +164,7 @@ class Recorder:
         self.rows.taken[1] = 0
 
     def trajectory(self, header: Header, forces: Callable[[Rows, Parameters], Array]) -> Trajectory:
-        """The run so far; adds ``energy_residual`` and ``energy_scale`` in J to the settings of the
-        header.
+        """The run so far, with ``energy_residual`` and ``energy_scale``, J, among its settings.
 
         The residual is the largest |change of energy - work of drag, friction and impacts| at a
         sample. `forces` gives those of the samples, (n, 6) in the order A_x … B_z, N."""

@@ -29,8 +29,7 @@ class Settings:
     Raises `InputError` if a value is out of range."""
 
     method: str = "event"
-    """``event``: integrate case by case and locate every change of case. ``time-stepping``:
-    Moreau-Jean, see there."""
+    """``event``: case by case, locating every change. ``time-stepping``: Moreau-Jean, see there."""
     rtol: float = 1e-9
     """Relative tolerance of the integrator (event); the absolute one is a thousandth of it in
     natural units: lengths in R, times in sqrt(R/g), the ball's spin in that of a ball that rolls at

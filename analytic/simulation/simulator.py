@@ -109,8 +109,7 @@ def slip_perturbation(p: Parameters, slip: float, beta: float, t_end: float) -> 
 def unloading(p: Parameters, hold: float) -> Trajectory:
     """omega_0 lowered in steps through omega_02 in NR: the black dot of Fig. 13 (eta > j).
 
-    NR is left for NS, the ball falls, hits the floor, and ends in RR: the transients and impacts of
-    section 5.3."""
+    NR is left for NS, the ball hits the floor, and ends in RR: the transients of section 5.3."""
     limit = bifurcation.thresholds(p).omega_02
     levels = limit * np.array([1.2, 1.1, 1.02, 0.98])
     start = stationary.solution(p.replace(omega_0=float(levels[0])), Case.NR).state._replace(y=0.02)

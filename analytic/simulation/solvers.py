@@ -88,8 +88,7 @@ def _root(
 ) -> float:
     """Share of a step in (low, high) at which a guard falls through its level, to round-off.
 
-    By the rule of false position, whose end that stays counts half the next time (Illinois); halved
-    where that is slow."""
+    By false position, whose end that stays counts half the next time (Illinois), or by halving."""
     _interpolate(low, z, F, now)
     equations.guards(t + low * h, now, k, values)
     above = values[guard] - level
@@ -383,8 +382,7 @@ def implicit_steps(
 ) -> tuple[int, float, float, int, int]:
     """As `explicit_steps`, by `STIFF_STEPS` implicit ones, or until all slips are `GROWN_SLIP`.
 
-    A Jacobian shifts z by a share of it, or at least of its natural size, or of the tolerance times
-    that for a slip."""
+    A Jacobian shifts z by a share of it, at least of its size, of a slip times the tolerance."""
     k, until, z, scale, times, samples, arm, level = of
     n, span, (first, end) = len(z), until - start, coordinates.TURNING[k.case]
     table, J, here, rate = np.empty((COLUMNS, n)), np.empty((n, n)), np.empty(n), np.empty(n)

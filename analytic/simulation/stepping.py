@@ -165,8 +165,7 @@ def solve(
 ) -> StepSolution:
     """Velocities after dt, 0 for an impact, with closed contacts.
 
-    Smooth forces, at the mean of both velocities, and contacts are iterated together; `start`
-    guesses the impulses."""
+    Smooth forces, at the mean velocity, and contacts are iterated; `start` guesses the impulses."""
     u, slips = at.u, _old_slip(at, dt, p)
     fastest = max(abs(u.v_h), abs(u.v_y), abs(u.v_k), p.r * max(abs(u.o_x), abs(u.o_y), abs(u.o_z)))
     for tolerance in (TOLERANCE, BARELY):
@@ -231,8 +230,7 @@ def _free(old: Velocities, middle: Middle, A_t: float, dt: float, p: Constants) 
 def _impulses(
     free: Velocities, slips: Slips, touching: Touching, B: Impulse, aim: float, p: Constants
 ) -> tuple[Impulse, Impulse, float]:
-    """Impulses of A and B per mass that obey Coulomb's law to a tolerance `aim`, near a guess at B;
-    and by how much they don't."""
+    """Impulses per mass by Coulomb's law to a tolerance `aim`, near a guess at B; their change."""
     a, b = needs(free, touching.to_A, touching.to_B, slips, p)
     on_A, on_B = Friction(p.mu, 0.0, 0.0), Friction(p.eta, 0.0, 0.0)
     if touching.A and touching.B:

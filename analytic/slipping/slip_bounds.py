@@ -3,8 +3,7 @@
 Out of NR gamma is known at every state, (56)-(61). Where the ball goes round with the fluid gamma
 is a straight line in omega_0^2, (61), (67), (74), (82), (83): `SlipBound`. At a fixed omega_c, for
 a ball that lags behind the fluid or leads, it is one in the fluid's push, with Stokes' law in
-omega_0, (66), (73): `HeldBound`. `slip_stability.gamma` gives the same from the vector fields,
-along any direction."""
+omega_0, (66), (73): `HeldBound`. `slip_stability.gamma` is the same along any direction."""
 
 from __future__ import annotations
 
@@ -127,8 +126,7 @@ def rr_to_ss(p: Parameters, side: int) -> SlipBound:
     (83), side -1.
 
     (83) has a real bound for eta > 1 only, below which slip would grow; but there the wall would
-    have to pull, against (12), as section 4.3 ends. (82) has one where the floor presses for eta <
-    j only."""
+    have to pull, against (12), as 4.3 ends. (82) has one where the floor presses for eta < j."""
     unit = 1 / (p.j * p.r * (1 + p.mu * p.eta))
     drive = side * (p.mu * p.eta * (1 + p.j) + p.j) - p.eta
     return SlipBound(-unit * p.mu * p.g * (1 + side * p.eta), unit * p.R * drive)

@@ -9,8 +9,7 @@ Friction and normal forces along the branch don't depend on the law of drag
 (`analytic.mechanics.drag`). It says which lag Omega_0 - Omega_c the drag needs to balance friction,
 and how much more drag a little more lag brings: `stiffness`, which is kappa for Stokes' law.
 
-All functions take the place s, the parameters, and mu and eta if they aren't those of p: floats or
-arrays, which broadcast."""
+Functions take the place s, parameters, and mu and eta if not those of p: floats or arrays."""
 
 from __future__ import annotations
 
@@ -155,8 +154,7 @@ def fold(
 def points_at(p: Parameters) -> list[float]:
     """Places s of the branch in the flow p.omega_0 > 0, in the order of |alpha|; [] if none.
 
-    The first part of the branch, from RR to the fold, rises with Omega_0, the second falls; each
-    gives at most one."""
+    The branch rises with Omega_0 from RR to the fold, then falls: at most one of each part."""
     if not (p.mu > 0 and p.c > 0 and p.eta < p.j):
         return []
     turning = float(fold(p))
@@ -195,8 +193,7 @@ def eigenvalues_at(s: npt.ArrayLike, p: Parameters) -> Complex:
     """Eigenvalues (..., 4) of SS at places s of its branch, rad s-1, rightmost first.
 
     Those of `dynamics.jacobian`, from the coordinates omega_c, v_A/r, alpha and slip_y/slip_z
-    instead: near the ends, where slip vanishes and two directions stiffen like 1/v_A, the others
-    would drown in its round-off."""
+    instead: near the ends, where slip vanishes, two of them, like 1/v_A, would drown the others."""
     b = branch(s, p)
     unit = np.sqrt(p.g / p.R)
     omega_c, fluid, q = b.Omega_c * unit, b.Omega_0 * unit, b.v_A * np.sqrt(p.g * p.R) / p.r

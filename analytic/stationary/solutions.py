@@ -35,8 +35,7 @@ class Stability(Enum):
 
     ASYMPTOTIC = "asymptotically stable"
     ALGEBRAIC = "asymptotically stable, but approached more slowly than exponentially"
-    """Where the fluid takes the ball along under the quadratic law, whose drag has no part linear
-    in the lag."""
+    """With the fluid under the quadratic law, whose drag has no part linear in the lag."""
     NEUTRAL = "neutrally stable"
     UNSTABLE = "unstable"
 
@@ -116,8 +115,7 @@ def solution(
 ) -> StationarySolution:
     """The stable stationary solution of a case at p.omega_0, or the unstable one.
 
-    `formal` takes it even if its contact forces are inadmissible: NR below omega_02, SR with A_y <
-    0.
+    `formal` takes it even if its forces are inadmissible: NR below omega_02, SR with A_y < 0.
 
     A case may be given by its name. Raises `InputError` if there is none, or more than one (two are
     unstable between the Hopf points of a very rough floor)."""
@@ -228,8 +226,7 @@ def _rs(p: Parameters) -> list[StationarySolution]:
 def _sr(p: Parameters) -> list[StationarySolution]:
     """Proposition 3, for the formal field: A_y = 0 puts the solution on the border to NR.
 
-    On a smooth floor any slip_x is stationary; the member given is the one that doesn't spin about
-    the radius."""
+    On a smooth floor any slip_x is stationary; that without spin about the radius is given."""
     if p.omega_0 == 0:
         return []
     if p.mu == 0:
@@ -240,8 +237,7 @@ def _sr(p: Parameters) -> list[StationarySolution]:
 
 
 def _ss(p: Parameters) -> list[StationarySolution]:
-    """Proposition 4, by root finding along the branch. On a smooth wall slip_y is free: the member
-    given has none."""
+    """Proposition 4, by roots along the branch. On a smooth wall slip_y is free, and given as 0."""
     smooth = ("slip_y",) if p.eta == 0 else ()
     if p.mu == p.eta == 0 and p.omega_0 != 0:
         x = State(omega_c=p.omega_0, slip_x=-p.omega_0 * p.R / p.r, slip_y=1.0)
