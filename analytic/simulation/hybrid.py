@@ -17,7 +17,7 @@ from analytic.mechanics import dynamics
 from analytic.mechanics.rigid_body import Forces
 from analytic.simulation import compiling, coordinates, equations, motion, transitions
 from analytic.simulation.equations import A_LANDS, AWAY, NONE, System
-from analytic.simulation.integrator import StalledError, first_pace, stretch
+from analytic.simulation.integrator import StalledError, stretch
 from analytic.simulation.motion import HybridState, Recorder, Rows
 from analytic.simulation.settings import LANDED, Settings
 from analytic.simulation.solvers import DONE, FIRED, STUCK, Stretch
@@ -62,7 +62,9 @@ def follow(
     opens = coordinates.arm_guards(values, k, arm, level)
     lasts = coordinates.rebound_time(at, z, k, rate)
     first = lasts / 20 if lasts < until - at.time else 0.0
-    pace = first_pace(at.time, z, scale, case, opens, first)
+    small = coordinates.least_slip(z, scale, case) < equations.ONSET_SLIP
+    # where a contact opens, a straight line is tried at once
+    pace = at.time, 0.0, 0.0 if small else first, small, 1 if opens else 0
     if run.taken[0] == 0:
         _keep_sample(at, k, run)
     of = Stretch(k, until, z, scale, run.times, run.x, arm, level)

@@ -11,9 +11,8 @@ import math
 import numpy as np
 
 from analytic.simulation import coordinates, equations, solvers
-from analytic.simulation.equations import ONSET_SLIP, SMALL_SLIP, STIFF_STEPS
+from analytic.simulation.equations import SMALL_SLIP, STIFF_STEPS
 from analytic.simulation.solvers import DONE, OTHER, PAUSED, STUCK, Stretch
-from model.arrays import Array
 
 Pace = tuple[float, float, float, bool, int]
 """How the steps of a stretch go on: a time, s, from which tau counts, since directions settle in
@@ -23,14 +22,6 @@ found; whether a slip is small; strides since it was not."""
 
 class StalledError(ArithmeticError):
     """A solver can't go on, or the run makes no progress."""
-
-
-def first_pace(
-    start: float, z: Array, scale: Array, case: int, opens: bool, first_step: float
-) -> Pace:
-    """How steps begin in a stretch; if a contact `opens`, a straight line is tried at once."""
-    small = coordinates.least_slip(z, scale, case) < ONSET_SLIP
-    return start, 0.0, 0.0 if small else first_step, small, 1 if opens else 0
 
 
 def finish_straight(t: float, of: Stretch, taken: int) -> int:

@@ -122,8 +122,7 @@ def _root(
 
 def _weighted_sum(weights: Array, count: int, K: Array, out: Array) -> None:
     """The sum of the first `count` rows of K (s, n), each times its weight."""
-    for i in range(len(out)):
-        out[i] = 0.0
+    out[:] = 0.0
     for j in range(count):
         for i in range(len(out)):
             out[i] += weights[j] * K[j, i]
@@ -135,17 +134,13 @@ def _interpolant(
     """Coefficients F of the interpolant of a step from z to `new`; computes three more stages K."""
     for s in range(len(C_MORE)):
         _weighted_sum(A_MORE[s], STAGES + 1 + s, K, now)
-        for i in range(len(z)):
-            now[i] = z[i] + h * now[i]
+        now[:] = z + h * now
         equations.rates(t + C_MORE[s] * h, now, k, K[STAGES + 1 + s])
-    for i in range(len(z)):
-        change = new[i] - z[i]
-        F[0, i], F[1, i] = change, h * K[0, i] - change
-        F[2, i] = 2 * change - h * (K[STAGES, i] + K[0, i])
+    F[0] = new - z
+    F[1], F[2] = h * K[0] - F[0], 2 * F[0] - h * (K[STAGES] + K[0])
     for j in range(len(D)):
         _weighted_sum(D[j], ALL, K, F[3 + j])
-        for i in range(len(z)):
-            F[3 + j, i] *= h
+        F[3 + j] *= h
 
 
 def _first_fall(
@@ -301,8 +296,7 @@ def explicit_steps(
         left = _time_to_stop(K[0], rtol, of) if least < DYING else math.inf
         sampled = taken < len(times) and _is_past(times[taken], start, tau + left)
         if tau + left <= span and not sampled:
-            for i in range(n):
-                z[i] += left * K[0, i]
+            z += left * K[0]
             equations.guards(start + tau + left, z, k, values)
             return FIRED, tau + left, h, int(values.argmin()), taken
         if slow > STIFF_STEPS:
@@ -351,18 +345,14 @@ def _extrapolation_step(
     for column in range(COLUMNS):
         steps = column + 1
         part, y = h / steps, table[column]
-        for i in range(n):
-            for c in range(n):
-                M[i, c] = (i == c) - part * J[i, c]
+        M[:] = np.eye(n) - part * J
         _lu_factor(M, order)
         y[:] = z
         for s in range(steps):
             equations.rates(t + (s + 1) * part, y, k, rate)
-            for i in range(n):
-                rate[i] *= part
+            rate *= part
             _lu_solve(M, order, rate)
-            for i in range(n):
-                y[i] += rate[i]
+            y += rate
         square = 0.0
         for q in range(column - 1, -1, -1):
             square = 0.0
@@ -396,8 +386,7 @@ def implicit_steps(
             is_slip = c in range(first, end, 2)
             now[c] += math.sqrt(EPS) * max(abs(z[c]), scale[c] * (k.rtol if is_slip else 1.0))
             equations.rates(start + tau, now, k, rate)
-            for i in range(n):
-                J[i, c] = (rate[i] - here[i]) / (now[c] - z[c])
+            J[:, c] = (rate - here) / (now[c] - z[c])
         if h <= 0:
             h = _first_length(1e-3, here, span - tau, of)
         stop = min(span, times[taken] - start) if taken < len(times) else span
