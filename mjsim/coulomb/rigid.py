@@ -119,7 +119,7 @@ def share_loads(model: Any, memory: Any) -> None:
     """
     contacts, first = contacts_of(memory), 0
     while first < memory.contacts:
-        after, slides = first, True
+        after, slides = first + 1, contacts[first].state == SLIDES
         while after < memory.contacts and same_face(model, contacts[first], contacts[after]):
             slides = slides and contacts[after].state == SLIDES
             after += 1

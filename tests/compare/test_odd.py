@@ -379,6 +379,7 @@ USERS = {  # a slice of some 330 lines that were drawn by hand: what must be in 
     "simulate --start omega_c=5rad/s": "omega_c = '5rad/s' must be a number in rad s-1",
     "design three.toml": "ball: r = [1, 2, 3] must be a number in m, or the two between which",
     "forecast no-mjcf.xml": "no-mjcf.xml: MuJoCo refuses it: XML Error: Unrecognized XML",
+    "simulate --engine mujoco-free --r 1e-6": "mujoco-free can't build the vessel: ",
     "forecast /dev/null": "cannot read /dev/null: it is not a file",
     "inspect pipe": "cannot read pipe: it is not a file",
     "cases -o pipe": "cannot write to pipe: File exists",

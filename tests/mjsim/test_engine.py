@@ -93,6 +93,12 @@ def test_divergence_stops_a_run_and_keeps_what_there_is(settings, wild) -> None:
     assert len(sound.time) == 101
 
 
+def test_a_vessel_beyond_all_numbers_ends_a_run_and_not_the_patience() -> None:
+    """Its wall has no direction, by which the law told contacts apart for ever."""
+    with pytest.raises(SimulationError, match="diverged"):
+        mjsim.simulate(P.replace(R=1e16), [0] * 6, 0.1)
+
+
 @pytest.mark.parametrize("miss", [3e-4, 3e-3])
 def test_a_ball_that_passes_the_axis_goes_on(miss) -> None:
     """Without friction a straight line past the axis; of an azimuth that turns by phi in a step,

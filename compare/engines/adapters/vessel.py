@@ -107,7 +107,7 @@ def simulate(
     with closing(library.load(member)) as engine:
         try:
             engine.build(Vessel.of(p, x, flow), h)
-        except RuntimeError as error:
+        except (RuntimeError, ValueError) as error:
             raise InputError(
                 f"{task.engine} can't build the vessel: {' '.join(str(error).split())[:80]}"
             ) from error
