@@ -40,7 +40,6 @@ from compare.method.quantities import QUANTITIES
 from compare.subjects.thresholds.figures import TINTS
 from compare.view import cases, steady
 from compare.view import page as motion
-from compare.view.guard import OwnOrigin
 from model import Case, InputError, Parameters, SimulationError, State, Trajectory, drag, storage
 from model.parameters import REACH, parse_number
 
@@ -257,6 +256,8 @@ def serve(p: Parameters, port: int, show: bool) -> None:
         from starlette.middleware.trustedhost import TrustedHostMiddleware
         from starlette.responses import HTMLResponse
         from uvicorn import server
+
+        from compare.view import guard
     except ImportError as error:
         raise InputError("explore needs NiceGUI: pip install 'nicegui>=3.18'") from error
     with socket.socket() as tried:
@@ -270,14 +271,14 @@ def serve(p: Parameters, port: int, show: bool) -> None:
             raise InputError(f"port {port} {why}; choose another one by --port") from error
     scene = motion.write(p, 1.0)
     app.add_route("/motion", lambda _: HTMLResponse(scene))
-    app.add_middleware(OwnOrigin)
+    app.add_middleware(guard.OwnOrigin)
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=[HOST, "localhost"])
     print(f"http://{HOST}:{port} (Ctrl-C ends it)", flush=True)
     server.HANDLED_SIGNALS = tuple(
         each for each in SIGNALS if signal.getsignal(each) is not signal.SIG_IGN
     )
     quiet: dict[str, Any] = {"reload": False, "show_welcome_message": False}
-    quiet["reconnect_timeout"] = RECONNECT
+    quiet |= {"reconnect_timeout": RECONNECT, "http": guard.Prompt}
     ui.run(partial(page, p), host=HOST, port=port, title="dualball", show=show, **quiet)
 
 

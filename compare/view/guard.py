@@ -1,11 +1,17 @@
-"""Who may speak to the page that this machine serves: its own tabs alone.
+"""Who may speak to the page that this machine serves: its own tabs, and nobody for ever.
 
 A browser lets any site that a user visits send requests here, and says in ``Origin`` which one."""
 
 from __future__ import annotations
 
+import asyncio
 from typing import Any
 from urllib.parse import urlsplit
+
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+HEADERS = 10.0
+"""Seconds that a client has for the headers of its first request."""
 
 
 class OwnOrigin:
@@ -26,3 +32,16 @@ class OwnOrigin:
         else:
             await send({"type": "http.response.start", "status": 403, "headers": []})
             await send({"type": "http.response.body", "body": b"another site's page\n"})
+
+
+class Prompt(H11Protocol):
+    """A connection that is closed if no request has come for `HEADERS` seconds."""
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Begin to wait."""
+        super().connection_made(transport)
+        self.loop.call_later(HEADERS, self._close_unless_asked)
+
+    def _close_unless_asked(self) -> None:
+        if self.scope is None and not self.transport.is_closing():
+            self.transport.close()

@@ -287,6 +287,15 @@ def test_pages_of_other_sites_are_not_answered(address, path):
     refusal.value.close()
 
 
+@pytest.mark.slow
+def test_who_is_slow_with_headers_is_not_waited_for(address):
+    guard = pytest.importorskip("compare.view.guard")
+    port = int(address.strip("/").rsplit(":", 1)[1])
+    with socket.create_connection(("127.0.0.1", port), timeout=3 * guard.HEADERS) as slow:
+        slow.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n")
+        assert slow.recv(100) == b""  # closed
+
+
 def test_without_the_extra_it_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "nicegui", None)
     with pytest.raises(InputError, match=r"pip install 'nicegui>=3.18'"):
