@@ -28,7 +28,7 @@ from model.versions import current_versions
 SLOW = Parameters.named("reference").replace(omega_0=12.0)
 ROUGH = Parameters.named("high-wall-friction").replace(omega_0=25.0)
 README = Path(__file__).with_name("templates") / "cases.md"
-SHARP = 1e-13  # relative tolerance of the event-driven simulation
+EVENT_RTOL = 1e-13  # relative tolerance of the event-driven simulation
 BOUND = 1e-10  # of what it then is wrong by: a hundred times what ten times the tolerance changes
 
 
@@ -122,7 +122,7 @@ def _in_vessel(
         )
         return np.concatenate(to_world(found.x, found.theta, other), axis=1)[1:], found
 
-    exact, motion = run(SHARP)
+    exact, motion = run(EVENT_RTOL)
     return ContactCase(
         name=name,
         about=f"a ball in a vessel: {about}",
@@ -131,7 +131,7 @@ def _in_vessel(
         exact=exact,
         contacts=tuple(case.name for case in motion.cases[1:]),
         bound=BOUND,
-        source=f"analytic.simulate, event-driven, rtol {SHARP:g}",
+        source=f"analytic.simulate, event-driven, rtol {EVENT_RTOL:g}",
         scales=(p.R, p.R * p.omega_0, p.R * p.omega_0 / p.r),
         wrong={text: run(1e-9, **how)[0] for text, how in wrong.items()},
         drag=p.c,

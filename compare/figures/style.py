@@ -40,7 +40,7 @@ HOPPING = "#7B3294"
 """Of a ball that hops for ever, a motion of several cases."""
 FORCE, SLIP, BALL = "#b3261e", "#6a3d9a", "#f5cc6b"
 """On pages of motions: arrows of force and slip, the ball."""
-Line = str | tuple[object, ...]
+LineStyle = str | tuple[object, ...]
 """A line style of matplotlib."""
 STABLE, UNSTABLE = "-", (0, (5, 2.5))
 _TURN = 4.0
@@ -62,7 +62,7 @@ NAME: dict[str, Any] = {"textcoords": "offset points", "fontsize": 9, "bbox": HA
 BARS: dict[str, Any] = {"ms": 5, "capsize": 2.5, "elinewidth": 1, "zorder": 4, "ls": "none"}
 """Measured points, with bars."""
 SYMBOLS = {"mu": "μ", "eta": "η", "j": "j", "kappa": "κ", "omega_0": "ω₀"}
-THRESHOLD_LINES: dict[str, tuple[str, Line]] = {
+THRESHOLD_LINES: dict[str, tuple[str, LineStyle]] = {
     "omega_01": (COLOURS[Case.RR], "-"),
     "omega_02": (COLOURS[Case.NR], "--"),
     "omega_03": (COLOURS[Case.SR], "-."),
@@ -168,7 +168,7 @@ def curve(
     x: npt.ArrayLike,
     y: npt.ArrayLike,
     name: Name = ("", None),
-    line: Line = STABLE,
+    line: LineStyle = STABLE,
 ) -> None:
     """Draw a line of theory (n,) in the colour of its case, where y is finite, and its name if that
     has a place.

@@ -29,7 +29,7 @@ from compare.figures.branches import (
     spin_of,
 )
 from compare.figures.drawing import Diagram, Drawing, Evidence, GapError, diagram, only_where
-from compare.figures.style import STABLE, UNSTABLE, Line, Place
+from compare.figures.style import STABLE, UNSTABLE, LineStyle, Place
 from compare.method.record import Measurement
 from model import Case, Parameters, State
 from model.arrays import Array
@@ -208,7 +208,7 @@ def _draw_branches(
     guides = {name: getattr(t, name) for name in ("omega_01", "omega_02", "omega_03", "omega_04")}
 
     def draw(
-        case: Case, begin: float, end: float, name: str, place: Place, line: Line = STABLE
+        case: Case, begin: float, end: float, name: str, place: Place, line: LineStyle = STABLE
     ) -> None:
         slip_x, flows = round_with_fluid(p, case, begin, end)  # the ball goes round with the fluid
         style.curve(axes, case, flows, spin(p, slip_x, flows), (name, place), line)
