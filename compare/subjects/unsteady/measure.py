@@ -135,26 +135,26 @@ class Pulsation:
         """The pulsation with a ball whose omega_c is this as a period begins, rad s-1."""
         return replace(self, lead=(omega_c - self.p.omega_0) / self.amplitude)
 
+    def step(self, amplitude: float) -> float:
+        """The longest time step for an amplitude, s: a period divided by a power of two."""
+        f, least = self.frequency, self.runner.sampling.pulsation_steps
+        fastest = 4 * (self.p.omega_0 + amplitude) / f
+        most = max(least, 1 / (f * coarse_step(self.p)), fastest)
+        return 1 / (f * 2.0 ** math.ceil(math.log2(most)))
+
     def task(
         self,
         amplitude: float,
         x: Array,
         periods: float,
         samples: int,
-        divisor: int,
+        step: float,
         phase: float = 0.0,
-        largest: float = 0.0,
     ) -> Task:
-        """A run from a state, with so many samples in a period, and the longest time step divided;
-        the flow begins at a phase, rad.
-
-        Steps in a period, a power of two, suit the `largest` amplitude."""
-        f, least = self.frequency, self.runner.sampling.pulsation_steps
-        fastest = 4 * (self.p.omega_0 + max(amplitude, largest)) / f
-        steps = 2 ** math.ceil(math.log2(max(least, 1 / (f * coarse_step(self.p)), fastest)))
-        step, flow = 1 / (f * steps * divisor), Flow.sine(self.p.omega_0, amplitude, f, phase)
-        count, t_end = round(samples * periods), periods / f
-        return self.runner.task(self.p, x, t_end, step, flow=flow, samples=count)
+        """A run from a state, with so many samples in a period; the flow begins at a phase, rad."""
+        f = self.frequency
+        flow, count = Flow.sine(self.p.omega_0, amplitude, f, phase), round(samples * periods)
+        return self.runner.task(self.p, x, periods / f, step, flow=flow, samples=count)
 
     def search(self) -> Search:
         """A search for the amplitude at which slip begins, in runs of a period and a half."""
@@ -169,9 +169,9 @@ class Pulsation:
             size = self.amplitude
 
         def task(amplitude: float, bracket: Bracket, attempt: Attempt) -> Task:
-            x, lasts, divisor = self.start(amplitude), 1.5 * attempt.time, 2 * attempt.divisor
-            samples = sampling.pulsation_samples
-            return self.task(amplitude, x, lasts, samples, divisor, largest=around.high)
+            x, lasts = self.start(amplitude), 1.5 * attempt.time
+            step = self.step(around.high) / (2 * attempt.divisor)
+            return self.task(amplitude, x, lasts, sampling.pulsation_samples, step)
 
         return Search(around, task, rolls_on, sampling.pulsation_width * size)
 
@@ -216,7 +216,8 @@ def _settle(
     x, rounds = each.start(amplitude), list[Round]()
     for n in range(ROUNDS):
         finer = each.runner.sampling.pulsation_divisor if n == ROUNDS - 1 else 1
-        task = each.task(amplitude, x, PERIODS, samples, divisor * finer)
+        step = each.step(amplitude) / (divisor * finer)
+        task = each.task(amplitude, x, PERIODS, samples, step)
         (runs,) = yield from asked([task])
         if isinstance(runs, str):
             return f"the run {runs}"
@@ -284,7 +285,8 @@ def mean_error(each: Pulsation, amplitude: float) -> Procedure[None]:
     (_, run, _), (task, halved, _) = seen
     states = enumerate(run.x[-1 - samples : -1 : samples // PHASES])
     phases = ((x, 2 * math.pi * k / PHASES) for k, x in states)
-    anew = [each.task(amplitude, x, 1, samples, 1, phase=phase) for x, phase in phases]
+    step = each.step(amplitude)
+    anew = [each.task(amplitude, x, 1, samples, step, phase) for x, phase in phases]
     (again,) = yield from asked(anew)
     if isinstance(again, str):
         yield each.missing(f"the run {again}")
