@@ -125,8 +125,6 @@ def read_gaps(data: Any, memory: Any) -> None:
     for i in range(memory.contacts):
         given = found[contacts[i].index]
         contacts[i].gap, contacts[i].margin = given.dist, given.includemargin
-        for axis in range(3):
-            contacts[i].turned[axis] = 0.0
     poses = engine_contacts(memory.pose_at, data.ncon)
     for i in range(data.ncon):
         if poses[i].exclude and found[i].efc_address >= 0:
@@ -230,6 +228,7 @@ def copy_jacobians(model: Any, data: Any, memory: Any) -> None:
     size, total, u = jacobian_length(model, data, memory), 0, 0
     given, columns = reals(data.efc_J, size), integers(data.efc_J_colind, size)
     jacobian, column = reals(memory.jacobian_at, size), integers(memory.column_at, size)
+    speed, velocity = reals(data.efc_vel, data.nefc), reals(data.qvel, model.nv)
     while u < len(rows):
         dim, length = rows[u].dim, lengths[u] if sparse else model.nv
         begin, first = begins[u] if sparse else u * length, total
@@ -240,10 +239,12 @@ def copy_jacobians(model: Any, data: Any, memory: Any) -> None:
         count = total - first
         for r in range(dim - 1, -1, -1):  # the first row, whose columns say where, is the last
             rows[u + r].first, rows[u + r].length = first + r * count, count
+            rows[u + r].surface = speed[u + r]
             for k in range(count):
                 n, at = column[first + k], first + r * count + k
                 jacobian[at] = given[n + r * length]
                 column[at] = columns[n] if sparse else n - begin
+                rows[u + r].surface -= jacobian[at] * velocity[column[at]]
         u, total = u + dim, first + dim * count
 
 
@@ -375,6 +376,7 @@ def inherit(model: Any, data: Any, memory: Any, contact: Any, old: Any) -> None:
     )
     for axis in range(3):  # one that wanders over its bodies, or is made of several, has none
         contact.velocity[axis] = old.velocity[axis] if known else math.inf
+        contact.turned[axis] = old.turned[axis] if alone else 0.0
     contact.state = max(contact.state, old.state)
     contact.error, contact.lift = max(contact.error, old.error), max(contact.lift, old.lift)
     contact.load += old.load
@@ -398,12 +400,15 @@ def spin(model: Any, data: Any, contact: Any, side: int) -> float:
 
 @kernel
 def is_fixed(model: Any, memory: Any, old: Any, turning: float) -> bool:
-    """Whether a contact has moved on its bodies by no more than it creeps, and they don't roll."""
+    """Whether a contact has moved on its bodies by no more than it creeps, or a belt carries it,
+    and they don't roll."""
     creep = 0.0
     for axis in range(3 if old.state == STICKS else 0):
         creep += old.velocity[axis] ** 2
+    carried = old.belt if old.state == STICKS else 0.0
     rolled = memory.law.fixed * turning * smaller_radius(model, old)
-    return bool(old.moved <= 2 * (model.opt.timestep * (rolled + math.sqrt(creep))) ** 2)
+    way = model.opt.timestep * (rolled + carried + math.sqrt(creep))
+    return bool(old.moved <= 2 * way**2)
 
 
 @kernel

@@ -44,6 +44,8 @@ CONTACT = np.dtype(
         # friction in the axes of both geoms: geom, axis, force (N) or moment (N m)
         ("friction", _f8, (2, 3, 2)),
         ("velocity", _f8, 3),  # relative, by the last Jacobian and present velocities, m s-1
+        ("turned", _f8, 3),  # what its rows leave out, by axis, as its Jacobian turns, m s-2
+        ("belt", _f8),  # how fast its surfaces move on their bodies at most, m s-1
         ("lift", _f8),  # distance that Baumgarte stabilisation holds, m
         # De Saxcé's shift, the coefficient of friction times the slip, m s-2
         ("predicted", _f8),
@@ -64,7 +66,6 @@ CONTACT = np.dtype(
         ("mu", _f8, 5),  # coefficients of friction: two of sliding, of spin, two of rolling, m
         ("cone", _f8),  # MuJoCo's regular coefficient, of the cone in scaled forces
         ("weakened", _i4),  # whether they are kinetic
-        ("turned", _f8, 3),  # what its rows leave out, by axis, as its Jacobian turns, m s-2
         ("moved", _f8),  # square of how far it has moved on its bodies, m2
         ("closes", _i4),  # whether Newton's method has just found that it does
         ("share", _f8),  # part of friction without a limit that it has
@@ -90,6 +91,7 @@ ROW = np.dtype(
         # if it is the first of a unit of Newton's method: how many rows that has, else 0; its
         # contact, or -1; a degree of freedom that it moves, -1: none; the next unit of its island
         *((name, _i4) for name in ("dim", "contact", "dof", "next")),
+        ("surface", _f8),  # velocity that surfaces have on their bodies, m s-1
         # what mjData had before, and what it was told
         *((name, _f8) for name in ("given_R", "given_reference", "told")),
         ("R", _f8),  # regularisation: acceleration per force, kg-1

@@ -85,38 +85,41 @@ def store_velocities(model: Any, data: Any, memory: Any) -> None:
     contacts, rows, velocity = contacts_of(memory), rows_of(memory), reals(data.qvel, model.nv)
     for i in range(memory.contacts):
         contact = contacts[i]
+        contact.belt = 0.0
         for j in range(3):
             contact.velocity[j] = 0.0
         for axis in range(min(contact.dim, 3)):
-            speed = times(memory, rows[contact.address + axis], velocity)
+            row = rows[contact.address + axis]
+            speed = times(memory, row, velocity) + row.surface
+            contact.belt += abs(row.surface)
             for j in range(3):
                 contact.velocity[j] += speed * contact.frame[axis, j]
 
 
 @kernel
-def add_turning(model: Any, data: Any, memory: Any, elapsed: float) -> None:
+def add_turning(model: Any, data: Any, memory: Any, since: float, moved: bool) -> None:
     """Let contacts that stick turn along with their bodies, or roll: rows leave out that Jacobians
     change.
 
     What is added is -dJ/dt v, less half of the share that a row loses of its velocity in a step:
     then friction does no work, before the turning or after it. Rigid contacts lose all, and a disc
-    that precesses keeps its energy.
+    that precesses keeps its energy. A call at the time of the last one, `since` 0 s, adds the same.
     """
-    contacts, rows, velocity = contacts_of(memory), rows_of(memory), reals(data.qvel, model.nv)
+    contacts, velocity = contacts_of(memory), reals(data.efc_vel, data.nefc)
     reference, rigid = reals(data.efc_aref, data.nefc), memory.law.rigid
     damping = reals(data.efc_KBIP, (data.nefc, 4))
     for i in range(memory.contacts):
         contact = contacts[i]
-        if contact.velocity[0] == math.inf or contact.dim == 1:
-            continue
-        if not rigid and contact.state != STICKS:
-            continue
-        closed = rigid and contact.state == STICKS and contact.load > 0
-        lost = 1.0 if rigid else min(model.opt.timestep * damping[contact.address + 1, 1], 1.0)
-        for axis in range(0 if closed else 1, 3):
-            before = 0.0
-            for j in range(3):
-                before += contact.frame[axis, j] * contact.velocity[j]
-            change = times(memory, rows[contact.address + axis], velocity) - before
-            contact.turned[axis] = change * (1 - lost / 2) / elapsed
+        sticks = contact.state == STICKS
+        turns = moved and since > 0 and contact.dim > 1 and (rigid or sticks)
+        for axis in range(min(contact.dim, 3)):
+            if since != 0:
+                contact.turned[axis] = 0.0
+            first = 0 if rigid and sticks and contact.load > 0 else 1
+            if turns and axis >= first and contact.velocity[0] < math.inf:
+                lost = min(model.opt.timestep * damping[contact.address + 1, 1], 1.0)
+                change = velocity[contact.address + axis]
+                for j in range(3):
+                    change -= contact.frame[axis, j] * contact.velocity[j]
+                contact.turned[axis] = change * (1 - (1.0 if rigid else lost) / 2) / since
             reference[contact.address + axis] -= contact.turned[axis]

@@ -80,7 +80,7 @@ def law_of_a_step(m: int, d: int, at: int) -> None:
     memory.pending = memory.contacts + memory.dry > 0
     if not memory.pending:
         return
-    find_references(model, data, memory, since if known and moved else 0.0)
+    find_references(model, data, memory, since, moved)
     if predict_slip(model, data, memory) or not known:
         solve(model, data, memory, known)
     elif rigid:
@@ -115,11 +115,8 @@ def update_contacts(
 
 
 @kernel
-def find_references(model: Any, data: Any, memory: Any, since: float) -> None:
-    """Find what rows ask for: MuJoCo's references are mended in mjData, and then read.
-
-    `since`: for how long contacts have turned along with their bodies, s; 0: they haven't.
-    """
+def find_references(model: Any, data: Any, memory: Any, since: float, moved: bool) -> None:
+    """Find what rows ask for: MuJoCo's references are mended in mjData, and then read."""
     read_rows(data, memory)
     if memory.law.kinetic < 1:
         weaken(model, data, memory)
@@ -128,8 +125,7 @@ def find_references(model: Any, data: Any, memory: Any, since: float) -> None:
         stiffen(model, data, memory)
     elif memory.law.servo:
         take_depth_away(model, data, memory)
-    if since > 0:
-        add_turning(model, data, memory, since)
+    add_turning(model, data, memory, since, moved)
     set_up(data, memory)
     if memory.law.rigid:
         share_loads(model, memory)

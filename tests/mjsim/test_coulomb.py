@@ -555,6 +555,29 @@ def test_what_rolls_on_a_body_that_turns_rolls_to_second_order():
 
 
 @WAYS
+@pytest.mark.parametrize(
+    "table",
+    [
+        '<geom type="box" size="1 1 .1" pos="0 0 -.1"/></body>',
+        '</body><geom type="plane" size="9 9 1" surfacevel="0 0 0 0 0 2"/>',
+    ],
+    ids=["turns", "seems to turn"],
+)
+def test_what_stands_on_a_turntable_stays_there(rigid, table):
+    """Also of a host that calls `mj_forward` after each step. What slips by what its turning adds
+    in 10 ms comes 4 % farther out in a second."""
+    axle = '<body><joint/><inertial pos="0 0 0" mass="1" diaginertia="1e6 1e6 1e6"/>'
+    made, data = world(axle + table + free("box", ".5 0 .05", FLAT), mu=1.0)
+    data.qvel[[0, 2, 6]] = 2.0, 1.0, 2.0
+    with Coulomb(made, rigid=rigid).installed():
+        for _ in range(500):
+            mujoco.mj_step(made, data)
+            mujoco.mj_forward(made, data)
+    assert math.hypot(*data.qpos[1:3]) == pytest.approx(0.5, rel=2e-4)
+    assert math.atan2(data.qpos[2], data.qpos[1]) == pytest.approx(2 * data.time, abs=2e-4)
+
+
+@WAYS
 def test_a_caster_swings_in_behind_what_draws_it(rigid):
     """Its wheel rolls where it points: tan(angle / 2) falls by a factor e when it is drawn as far
     as it trails. Soft wheels that slipped by what their turning adds in 10 ms fell by 4.5."""
