@@ -14,7 +14,7 @@ from .compiling import kernel
 from .contacts import cosine, smaller_radius
 from .engine import integers, mj_factorM, mj_fwdActuation, mjd_smooth_vel, reals
 from .friction import shift
-from .memory import SLIDES, contacts_of, rows_of
+from .memory import OPEN, SLIDES, contacts_of, rows_of
 from .parameters import ALIGNED, APART, BOUNCES, NARROW, STUCK, USUAL_STEP
 from .rows import times
 
@@ -52,6 +52,13 @@ def is_moved_by_hand(model: Any, contact: Any) -> bool:
 
 
 @kernel
+def depth_kept(model: Any, memory: Any, contact: Any) -> float:
+    """Depth that a rigid contact keeps, m."""
+    scale = (model.opt.timestep / USUAL_STEP) ** 2
+    return float(memory.law.depth * scale * smaller_radius(model, contact))
+
+
+@kernel
 def velocity_to_ask_for(model: Any, memory: Any, contact: Any, estimate: float) -> float:
     """Normal velocity that closes a gap in the step, or takes a share of a depth away, m s-1; by
     the inverse mass that the engine estimates, kg-1.
@@ -62,7 +69,7 @@ def velocity_to_ask_for(model: Any, memory: Any, contact: Any, estimate: float) 
     h, law = model.opt.timestep, memory.law
     if contact.gap > 0:
         return float(-contact.gap / h * (law.push if contact.load > 0 else 1.0))
-    kept = law.depth * (h / USUAL_STEP) ** 2 * smaller_radius(model, contact)
+    kept = depth_kept(model, memory, contact)
     fastest = math.inf if is_moved_by_hand(model, contact) else h * memory.gravity
     if estimate * rows_of(memory)[contact.address].remembered > STUCK * memory.gravity:
         fastest = 0.0
@@ -115,16 +122,19 @@ def share_loads(model: Any, memory: Any) -> None:
     """Let points at which a body slides over another hold loads which lie on a plane, if they are
     more than three.
 
-    What else of their loads there is, no motion tells; errors of predicted slip would pile up.
+    What else of their loads there is, no motion tells; errors of predicted slip would pile up,
+    until one of them bears nothing.
     """
     contacts, first = contacts_of(memory), 0
     while first < memory.contacts:
         after, slides = first + 1, contacts[first].state == SLIDES
         while after < memory.contacts and same_face(model, contacts[first], contacts[after]):
-            slides = slides and contacts[after].state == SLIDES
+            contact = contacts[after]
+            touches = contact.gap <= depth_kept(model, memory, contact)
+            slides &= contact.state == SLIDES or (contact.state == OPEN and touches)
             after += 1
         if slides and after > first + 3:
-            hold_on_a_plane(memory, first, after)
+            hold_on_a_plane(model, memory, first, after)
         first = after
 
 
@@ -137,9 +147,9 @@ def same_face(model: Any, one: Any, other: Any) -> bool:
 
 
 @kernel
-def hold_on_a_plane(memory: Any, first: int, after: int) -> None:
+def hold_on_a_plane(model: Any, memory: Any, first: int, after: int) -> None:
     """Hold the loads a + b x + c y that are nearest to those of contacts, places from their
-    middle."""
+    middle; gaps within the depth that is kept count as closed."""
     contacts, rows, count = contacts_of(memory), rows_of(memory), after - first
     middle_x, middle_y, a = 0.0, 0.0, 0.0
     for i in range(first, after):
@@ -158,7 +168,11 @@ def hold_on_a_plane(memory: Any, first: int, after: int) -> None:
     b, c = (load_x * yy - load_y * xy) / area, (load_y * xx - load_x * xy) / area
     for i in range(first, after):
         x, y = in_plane(contacts[first], contacts[i])
-        rows[contacts[i].address].held = a + b * (x - middle_x) + c * (y - middle_y)
+        row = rows[contacts[i].address]
+        row.held = a + b * (x - middle_x) + c * (y - middle_y)
+        gap = min(max(contacts[i].gap, 0.0), depth_kept(model, memory, contacts[i]))
+        closes = memory.law.push if contacts[i].load > 0 else 1.0  # share of it in a step
+        row.reference += closes * gap / model.opt.timestep**2
 
 
 @kernel
