@@ -106,17 +106,21 @@ class Callback:
         self._installed: dict[int, Callable[[int], Simulation]] = {}
         self._ask = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)(self._adopt)
         self._in_force: list[Any] = []
+        self._tables = 0
         self._publish()
 
     def _publish(self) -> None:
         """Put a table of all simulations and models in the place of the one in force.
 
-        Threads may still be reading that one, so the last few are kept.
+        Threads may still be reading that one, so the last few are kept. Data may be found to be
+        garbage on the way: then a later table is in force already.
         """
-        known = sorted(self._simulations)
+        self._tables += 1
+        number, simulations = self._tables, dict(self._simulations)
+        known = sorted(simulations)
         arrays = [
             np.array(each, np.int64)
-            for each in ([*self._installed], known, [self._simulations[k].address for k in known])
+            for each in ([*self._installed], known, [simulations[k].address for k in known])
         ]
         new: Any = np.zeros(1, TABLE)
         new["ask"] = ctypes.cast(self._ask, ctypes.c_void_p).value
@@ -124,8 +128,9 @@ class Callback:
         for name, array in zip(("model_at", "data_at", "memory_at"), arrays, strict=True):
             new[name] = array.ctypes.data
         new["previous"] = self._before or 0
-        self._in_force = [*self._in_force[-7:], (new, arrays)]
-        table[0] = new.ctypes.data
+        kept, address = [*self._in_force[-7:], (new, arrays)], new.ctypes.data
+        if number == self._tables:
+            self._in_force, table[0] = kept, address
 
     def _adopt(self, model: int, data: int) -> int:
         """The memory of a simulation that is new to the callback."""
@@ -165,8 +170,10 @@ class Callback:
     ) -> None:
         """Have all simulations of a model under one law: these, and new ones that `adopt` makes."""
         with self._lock:
-            others = {k: s for k, s in self._simulations.items() if s.record["model"][0] != model}
-            self._simulations = others | dict(simulations)
+            for data, simulation in dict(self._simulations).items():
+                if simulation.record["model"][0] == model:
+                    self._simulations.pop(data, None)
+            self._simulations.update(simulations)
             self._installed[model] = adopt
             self._publish()
 

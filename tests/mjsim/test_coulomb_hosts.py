@@ -561,6 +561,22 @@ def test_one_law_at_a_time():
     stiff.step(mujoco.MjData(model))
 
 
+def test_data_may_be_found_to_be_garbage_at_any_time():
+    model, data = scene()
+    law, thresholds = Coulomb(model), gc.get_threshold()
+    for count in range(1, 150):
+        cycle = [mujoco.MjData(model)]
+        cycle.append(cycle)
+        law.step(cycle[0])
+        del cycle
+        gc.set_threshold(count, 1, 1)
+        try:
+            with law.installed():
+                mujoco.mj_step(model, data)
+        finally:
+            gc.set_threshold(*thresholds)
+
+
 def test_a_callback_set_under_installed_is_told_of():
     """The law acts no longer: a step of its own takes it back, else its end says so."""
     model, data = scene()
