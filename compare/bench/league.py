@@ -29,7 +29,7 @@ _OWN = "compare.engines.adapters"
 _AS_IT_COMES = "-defaults"
 _NEWTON = ("kamino", "xpbd", "xpbd-defaults", "semiimplicit-defaults", "vbd-defaults")
 ENTRIES = {
-    "mujoco": f"{_OWN}.mujoco_free:best",
+    "mujoco-free": f"{_OWN}.mujoco_free:best",
     "mujoco-plain": "compare.bench.joints:on_joints",
     "mujoco-defaults": f"{_OWN}.mujoco_free:defaults",
     "siconos": f"{_OWN}.siconos:best",
@@ -43,8 +43,8 @@ ENTRIES = {
 """Engines in the best settings known or, NAME-defaults, as they come: where Python imports
 them from, package.module:member."""
 _UNDER_THE_LAW = (
-    "mujoco is MuJoCo with free bodies under Coulomb's law, as mujoco-free of other commands; "
-    "MuJoCo's own contacts are those of mujoco-plain and mujoco-defaults."
+    "mujoco-free is MuJoCo with free bodies under Coulomb's law; MuJoCo's own contacts are those "
+    "of mujoco-plain and mujoco-defaults."
 )
 """What is to be quoted with its number."""
 KINDS = ("sticking", "rolling", "sliding", "landing")
@@ -117,7 +117,7 @@ def caption(league: Mapping[str, Sequence[Result]]) -> str:
         f"{1e3 * step:g} ms" + (f" ({', '.join(names)})" if len(engines) > 1 else "")
         for step, names in sorted(engines.items())
     ]
-    law = f" {_UNDER_THE_LAW}" if "mujoco" in league else ""
+    law = f" {_UNDER_THE_LAW}" if "mujoco-free" in league else ""
     return (
         "Errors at the shortest step in units of each case's scales; up to "
         f"{TOLERANCE:g} an engine passes, ✗ marks more. Order: power of the step with which errors "

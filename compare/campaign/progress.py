@@ -21,6 +21,8 @@ from compare.campaign.workers import Spread
 from model.errors import few
 
 INTERVAL = 10.0  #: seconds between plain lines
+SURE = 1.0
+"""Seconds of work by which it isn't told yet how long the rest takes: first parts are short."""
 READY = "getting ready"
 DRAWING = 0.1  #: share of a validation's time that drawing its figures takes, about
 BY_THE_TABLE = 60.0
@@ -82,7 +84,7 @@ class _Pace:
         """Seconds that are left; 0 where nobody knows.
 
         While nothing is said, that is no sign that it is slow."""
-        if not self._done > self._at_first >= 0:
+        if not self._done > self._at_first >= 0 or self._said - self._first < SURE:
             return 0.0
         a_part = (self._said - self._first) / (self._done - self._at_first)
         left = a_part * (self._total - self._done) - (self._clock() - self._said)

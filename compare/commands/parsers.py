@@ -359,8 +359,8 @@ def league(parser: Parser) -> None:
     parser.add_argument("--quick", action="store_true", help="one time step of 2 ms")
     named = (
         "only this one (repeatable), or a module of your own: siconos, mujoco-plain, NAME or "
-        f"NAME-defaults of {options.FOREIGN}, mujoco, mujoco-warp, newton-xpbd; newton-kamino, "
-        "newton-semiimplicit-defaults, newton-vbd-defaults"
+        f"NAME-defaults of {options.FOREIGN}, mujoco-free, mujoco-warp, newton-xpbd; "
+        "newton-kamino, newton-semiimplicit-defaults, newton-vbd-defaults"
     )
     parser.add_argument("--engine", action="append", metavar="NAME", help=named)
     options.add_processes(parser)

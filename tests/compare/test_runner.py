@@ -75,7 +75,8 @@ def test_an_adapter_that_gives_nothing_loses_all_cases(tmp_path, monkeypatch, ca
 
 def test_a_league_says_what_mujoco_is():
     """Its 39 of 39 would be quoted as MuJoCo's own."""
-    assert "mujoco is MuJoCo with free bodies under Coulomb's law" in league.caption({"mujoco": []})
+    said = "mujoco-free is MuJoCo with free bodies under Coulomb's law"
+    assert said in league.caption({"mujoco-free": []})
     assert "Coulomb" not in league.caption({"drake": []})
 
 

@@ -37,7 +37,7 @@ LONG = {
     "explore": "--no-browser --port 8099",
     "forecast": "scene.xml --try",
     "cases": "-o cases",
-    "league": "--engine mujoco-plain --engine mujoco --workers 2",
+    "league": "--engine mujoco-plain --engine mujoco-free --workers 2",
 }
 """What takes each command long."""
 

@@ -19,6 +19,7 @@ def soon(monkeypatch):
     """Progress is told at once, and often."""
     monkeypatch.setattr(waiting, "SOON", 0.1)
     monkeypatch.setattr(progress, "INTERVAL", 0.3)
+    monkeypatch.setattr(progress, "SURE", 0.1)
 
 
 def test_only_what_takes_long_says_so(soon, capsys):
