@@ -358,8 +358,8 @@ def league(parser: Parser) -> None:
     """All installed engines on the exact cases, as they come and in the best settings known."""
     parser.add_argument("--quick", action="store_true", help="one time step of 2 ms")
     named = (
-        "only this one (repeatable), or a module of your own: siconos, mujoco-plain, NAME or "
-        f"NAME-defaults of {options.FOREIGN}, mujoco-free, mujoco-warp, newton-xpbd; "
+        "only this one (repeatable), or a module of your own: siconos, mujoco-free, mujoco-plain, "
+        f"mujoco-defaults, NAME or NAME-defaults of {options.FOREIGN}, mujoco-warp, newton-xpbd; "
         "newton-kamino, newton-semiimplicit-defaults, newton-vbd-defaults"
     )
     parser.add_argument("--engine", action="append", metavar="NAME", help=named)

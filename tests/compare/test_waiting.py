@@ -122,4 +122,5 @@ def test_attractors_and_collections_say_how_far_they_are(tmp_path, capsys):
     assert carried_out(capsys, *line.split(), "-o", runs)[0] == 0
     told.clear()
     collection.collect(runs, tmp_path / "all.h5", 0, told.append)
-    assert told == [0.5, 1.0]
+    assert told == sorted(told)
+    assert told[-1] == 1.0
