@@ -172,8 +172,7 @@ def rigid(spec: Any, scene: Scene, timestep: float) -> None:
 defaults = Bodies("mujoco-defaults", CORNERS)
 best = Lawful(
     "mujoco",
-    "of second order where bodies slide or roll, but on what turns, and where something lands of "
-    "first",
+    "of second order where bodies slide or roll, and of first where something lands",
     f"rigid contacts under Coulomb's law (mjsim.Coulomb); a step in which something lands is "
     f"divided by {_PARTS}",
     rigid,
