@@ -11,6 +11,7 @@ import gc
 import io
 import itertools
 import os
+import re
 import resource
 import shlex
 import shutil
@@ -215,11 +216,9 @@ def carried_out(words: list[str], criteria: float) -> tuple[int, str, str]:
             raise TimeoutError
         # what it broke off may have left a file open: that is heard here, where it is ignored
         gc.collect()
-    said = "".join(
-        line
-        for line in err.getvalue().splitlines(True)
-        if not line.startswith("dualball: warning: ")
-    )
+    # warnings, and on a slow machine how far it was
+    beside = re.compile(r"dualball: warning: |\d+ s: ")
+    said = "".join(line for line in err.getvalue().splitlines(True) if not beside.match(line))
     return code, out.getvalue(), said
 
 
