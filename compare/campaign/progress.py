@@ -107,7 +107,7 @@ def reporter(quiet: bool = False, counted: bool = False, timed: bool = False) ->
     elif counted:
         with reporter() as show:
             yield lambda what, done, total, failed: show(
-                f"{what}: {done} of {total} runs", done, total, failed
+                f"{what}: {done} of {total} runs" if total else what, done, total, failed
             )
     elif sys.stderr.isatty():
         left = TextColumn("{task.fields[pace]}")  # a new text whenever it is looked at

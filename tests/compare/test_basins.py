@@ -61,7 +61,8 @@ def test_attractors_are_the_stable_solutions_that_theory_has_and_a_map_goes_on_w
             maps.append(basins(campaign, *given))
         for path in [path for path in tmp_path.glob("*.h5") if len(storage.contents(path)[1]) == 2]:
             path.unlink()  # as if it had been killed before MuJoCo's batch was whole
-    assert [done for what, done in seen if "theory" in what] == [0, 3, 0, 3]
+    # nothing of how long it takes, of which MuJoCo's part isn't known yet
+    assert [done for what, done in seen if "theory" in what] == [0, 0, 0, 0]
     runs = [done for what, done in seen if "theory" not in what]
     assert (runs[0], runs[-1], runs.count(0)) == (0, 2, 2)
     for basin in maps:

@@ -130,7 +130,10 @@ def basins(
     fine, other = [], []
     threads = max(1, campaign.workers) if isinstance(campaign.workers, int) else None
     for k, row in enumerate(states):
-        campaign.report(f"{campaign.doing}, by theory", k * len(x), len(y) * len(x), 0)
+        if coarse:  # how long MuJoCo will take isn't known yet
+            campaign.report(f"{campaign.doing}, by theory, then by MuJoCo", 0, 0, 0)
+        else:
+            campaign.report(f"{campaign.doing}, by theory", k * len(x), len(y) * len(x), 0)
         runs = analytic.simulate_many(
             p, row, lasts, sample_interval=lasts / INSTANTS, threads=threads
         )
