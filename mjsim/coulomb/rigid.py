@@ -127,15 +127,20 @@ def share_loads(model: Any, memory: Any) -> None:
     """
     contacts, first = contacts_of(memory), 0
     while first < memory.contacts:
-        after, slides = first + 1, contacts[first].state == SLIDES
+        after, slides = first + 1, slides_on(model, memory, contacts[first])
         while after < memory.contacts and same_face(model, contacts[first], contacts[after]):
-            contact = contacts[after]
-            touches = contact.gap <= depth_kept(model, memory, contact)
-            slides &= contact.state == SLIDES or (contact.state == OPEN and touches)
+            slides = slides and slides_on(model, memory, contacts[after])
             after += 1
         if slides and after > first + 3:
             hold_on_a_plane(model, memory, first, after)
         first = after
+
+
+@kernel
+def slides_on(model: Any, memory: Any, contact: Any) -> bool:
+    """Whether a contact slides, or bears nothing just now, within the depth that is kept."""
+    touches = contact.state == OPEN and contact.gap <= depth_kept(model, memory, contact)
+    return bool(contact.state == SLIDES or touches)
 
 
 @kernel
