@@ -173,11 +173,16 @@ def hold_on_a_plane(model: Any, memory: Any, first: int, after: int) -> None:
     b, c = (load_x * yy - load_y * xy) / area, (load_y * xx - load_x * xy) / area
     for i in range(first, after):
         x, y = in_plane(contacts[first], contacts[i])
-        row = rows[contacts[i].address]
-        row.held = a + b * (x - middle_x) + c * (y - middle_y)
-        gap = min(max(contacts[i].gap, 0.0), depth_kept(model, memory, contacts[i]))
-        closes = memory.law.push if contacts[i].load > 0 else 1.0  # share of it in a step
-        row.reference += closes * gap / model.opt.timestep**2
+        rows[contacts[i].address].held = a + b * (x - middle_x) + c * (y - middle_y)
+        leave_gap(model, memory, contacts[i])
+
+
+@kernel
+def leave_gap(model: Any, memory: Any, contact: Any) -> None:
+    """Let a contact keep its gap, as far as it is within the depth that is kept."""
+    gap = min(max(contact.gap, 0.0), depth_kept(model, memory, contact))
+    closes = memory.law.push if contact.load > 0 else 1.0  # share of it in a step
+    rows_of(memory)[contact.address].reference += closes * gap / model.opt.timestep**2
 
 
 @kernel
