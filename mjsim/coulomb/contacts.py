@@ -228,7 +228,6 @@ def copy_jacobians(model: Any, data: Any, memory: Any) -> None:
     size, total, u = jacobian_length(model, data, memory), 0, 0
     given, columns = reals(data.efc_J, size), integers(data.efc_J_colind, size)
     jacobian, column = reals(memory.jacobian_at, size), integers(memory.column_at, size)
-    speed, velocity = reals(data.efc_vel, data.nefc), reals(data.qvel, model.nv)
     while u < len(rows):
         dim, length = rows[u].dim, lengths[u] if sparse else model.nv
         begin, first = begins[u] if sparse else u * length, total
@@ -239,12 +238,10 @@ def copy_jacobians(model: Any, data: Any, memory: Any) -> None:
         count = total - first
         for r in range(dim - 1, -1, -1):  # the first row, whose columns say where, is the last
             rows[u + r].first, rows[u + r].length = first + r * count, count
-            rows[u + r].surface = speed[u + r]
             for k in range(count):
                 n, at = column[first + k], first + r * count + k
                 jacobian[at] = given[n + r * length]
                 column[at] = columns[n] if sparse else n - begin
-                rows[u + r].surface -= jacobian[at] * velocity[column[at]]
         u, total = u + dim, first + dim * count
 
 

@@ -28,6 +28,15 @@ def multiply(memory: Any, accelerations: Any) -> None:
 
 
 @kernel
+def find_surfaces(model: Any, data: Any, memory: Any) -> None:
+    """Find how fast surfaces move on their bodies: MuJoCo has it in its velocities alone."""
+    rows, velocity = rows_of(memory), reals(data.qvel, model.nv)
+    speed = reals(data.efc_vel, data.nefc)
+    for r in range(len(rows)):
+        rows[r].surface = speed[r] - times(memory, rows[r], velocity)
+
+
+@kernel
 def set_up(data: Any, memory: Any) -> None:
     """Read regularisation and reference acceleration of all rows; of soft contacts, friction is
     held."""

@@ -40,6 +40,7 @@ from .rigid import (
 )
 from .rows import (
     add_turning,
+    find_surfaces,
     multiply,
     put_rows_back,
     read_rows,
@@ -111,6 +112,7 @@ def update_contacts(
         find(model, data, memory)
         match(model, data, memory)
     copy_jacobians(model, data, memory)
+    find_surfaces(model, data, memory)
     remember_forces(memory)
 
 
