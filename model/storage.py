@@ -23,8 +23,11 @@ from model.hdf5 import dataset, reading, writing
 from model.parameters import Parameters
 from model.trajectory import (
     AXES,
+    AXIS_ATTRIBUTES,
     CONVENTIONS,
     FLUID,
+    SCHEMA,
+    SCHEMA_VERSION,
     Events,
     Header,
     Tabular,
@@ -34,13 +37,8 @@ from model.trajectory import (
 )
 from model.versions import current_versions
 
-SCHEMA, SCHEMA_VERSION = "dualball-trajectory", 1
 BATCH, BATCH_VERSION = "dualball-batch", 1
-"""What a file of one run, and one of many, say of themselves."""
-AXIS_ATTRIBUTES = {
-    "units": "1",
-    "long_name": "axes of the co-rotating frame: x inwards, y up, z along",
-}
+"""What a file of many runs says of itself."""
 _CASE_ENUM = h5py.enum_dtype({case.name: case.value for case in Case}, basetype=np.int8)
 _TEXT = h5py.string_dtype()
 _PACKED = {"compression": "gzip", "shuffle": True}
@@ -50,19 +48,14 @@ def save(run: Trajectory, path: str | Path) -> None:
     """Write a run; raises `StorageError` if that can't be done, leaving nothing behind."""
     check_type("run", run, Trajectory)
     with writing(path) as file:
-        write(run, file)
-
-
-def write(run: Trajectory, file: h5py.File) -> None:
-    """Write a run into a file of its own."""
-    scales = _write_common(file, SCHEMA, SCHEMA_VERSION)
-    file.attrs.update(run.header.attributes())
-    file.create_dataset("mjcf", data=run.header.mjcf, dtype=_TEXT)
-    for table, time in ((run, "time"), (run.events, "event_time")):
-        for name, meta in _stored_columns(type(table)).items():
-            values, shape = getattr(table, name), meta["shape"]
-            layout = {"maxshape": (None, *shape), "chunks": (1024, *shape), **_PACKED}
-            _create_column(file, meta, (time, "axis"), scales, data=values, **layout)
+        scales = _write_common(file, SCHEMA, SCHEMA_VERSION)
+        file.attrs.update(run.header.attributes())
+        file.create_dataset("mjcf", data=run.header.mjcf, dtype=_TEXT)
+        for table, time in ((run, "time"), (run.events, "event_time")):
+            for name, meta in _stored_columns(type(table)).items():
+                values, shape = getattr(table, name), meta["shape"]
+                layout = {"maxshape": (None, *shape), "chunks": (1024, *shape), **_PACKED}
+                _create_column(file, meta, (time, "axis"), scales, data=values, **layout)
 
 
 def save_batch(runs: Mapping[str, Trajectory], path: str | Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import io
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -29,6 +28,12 @@ AXES = ("x", "y", "z")
 """The paper's axes: x radially inwards, y upwards, z along the orbit."""
 CONVENTIONS = "CF-1.11"
 """Those of climate and forecast metadata, which readers such as xarray know."""
+SCHEMA, SCHEMA_VERSION = "dualball-trajectory", 1
+"""What a file of one run says of itself."""
+AXIS_ATTRIBUTES = {
+    "units": "1",
+    "long_name": "axes of the co-rotating frame: x inwards, y up, z along",
+}
 
 
 def _column(
@@ -154,19 +159,22 @@ class Trajectory:
     def to_xarray(self) -> xarray.Dataset:
         """The trajectory as xarray opens its file: units, cases, events, where it comes from.
 
-        Raises `InputError` if xarray or h5netcdf, optional dependencies, aren't installed."""
+        Raises `InputError` if xarray, an optional dependency, isn't installed."""
         try:
-            import h5netcdf as h5netcdf  # here, because they are optional and take a second to load
-            import h5py
-            import xarray
+            import xarray  # here, because it is optional and takes a second to load
         except ImportError as error:
             raise InputError("to_xarray() needs xarray: pip install xarray h5netcdf") from error
-        from model import storage
-
-        content = io.BytesIO()
-        with h5py.File(content, "w", track_order=True) as file:
-            storage.write(self, file)
-        return xarray.load_dataset(content, engine="h5netcdf")
+        variables: dict[str, Any] = {
+            "axis": ("axis", list(AXES), AXIS_ATTRIBUTES),
+            "mjcf": ((), self.header.mjcf),
+        }
+        for table, time in ((self, "time"), (self.events, "event_time")):
+            for name, meta in columns(type(table)).items():
+                values = getattr(table, name)
+                variables[meta["name"]] = ((time, "axis")[: values.ndim], values, attributes(meta))
+        variables["omega_0"] = ("time", self.omega_0, attributes(FLUID))
+        schema = {"schema": SCHEMA, "schema_version": SCHEMA_VERSION}
+        return xarray.Dataset(variables, attrs=schema | self.header.attributes())
 
     def table(self) -> dict[str, Array]:
         """All that a sample holds by number, each (n,): forces split along `AXES` (force_Ax …)."""
