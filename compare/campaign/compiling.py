@@ -5,7 +5,8 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 from weakref import WeakSet
 
@@ -18,6 +19,19 @@ FORGOTTEN = 1.0  #: seconds after which a worker that said it compiles no longer
 KEPT = "compiling, up to a minute, once on this machine"
 NOT_KEPT = "compiling, each time: no place to keep it; NUMBA_CACHE_DIR can name one"
 workers: WeakSet[Connection] = WeakSet()  #: the ends of pipes at which workers are heard
+
+
+@contextmanager
+def watched(watch: Callable[[threading.Event], None]) -> Iterator[None]:
+    """A context beside which a thread watches, until the event that it is given is set."""
+    ended = threading.Event()
+    thread = threading.Thread(target=watch, args=[ended], daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
 
 
 class _Heard:

@@ -123,7 +123,7 @@ def reporter(quiet: bool = False, counted: bool = False, timed: bool = False) ->
 
             yield show
     else:  # what is being done at once, and how far it is every `INTERVAL`, whatever happens
-        began, ended = time.monotonic(), threading.Event()
+        began = time.monotonic()
         pace, last = _Pace(timed), (READY, 0, 0, 0)
 
         def remember(what: str, done: int, total: int, failed: int) -> None:
@@ -132,7 +132,7 @@ def reporter(quiet: bool = False, counted: bool = False, timed: bool = False) ->
                 print(", ".join(filter(None, [what, pace.look()])), file=sys.stderr, flush=True)
             last = what, done, total, failed
 
-        def print_progress() -> None:
+        def print_progress(ended: threading.Event) -> None:
             due = min(SOON, INTERVAL)
             while not ended.wait(OFTEN):
                 pace.look()
@@ -146,13 +146,8 @@ def reporter(quiet: bool = False, counted: bool = False, timed: bool = False) ->
                 said += f", {pace}" if str(pace) else ""
                 print(said, file=sys.stderr, flush=True)
 
-        thread = threading.Thread(target=print_progress, daemon=True)
-        thread.start()
-        try:
+        with compiling.watched(print_progress):
             yield remember
-        finally:
-            ended.set()
-            thread.join()
 
 
 @dataclass

@@ -14,13 +14,13 @@ from compare.campaign.compiling import OFTEN, SOON
 def told(what: str) -> Iterator[Callable[[float], None]]:
     """A context that says what goes on once it takes long; yields a function to be called with the
     fraction done, by those that know it."""
-    ended, done = threading.Event(), 0.0
+    done = 0.0
 
     def tell(fraction: float) -> None:
         nonlocal done
         done = max(done, fraction)
 
-    def watch() -> None:
+    def watch(ended: threading.Event) -> None:
         for _ in range(round(SOON / OFTEN)):
             compiling.listen()
             if ended.wait(OFTEN):
@@ -31,10 +31,5 @@ def told(what: str) -> Iterator[Callable[[float], None]]:
             while not ended.wait(OFTEN):
                 show(what, round(1000 * done), 1000 if done else 0, 0)
 
-    thread = threading.Thread(target=watch, daemon=True)
-    thread.start()
-    try:
+    with compiling.watched(watch):
         yield tell
-    finally:
-        ended.set()
-        thread.join()
