@@ -31,7 +31,6 @@ from .memory import (
 from .parameters import ALIKE, APART, FARTHEST, FLUSH, STILL, UNMOVED
 
 SIZE = MJ_CONTACT.itemsize
-
 WORDS = SIZE // 8
 
 

@@ -76,7 +76,6 @@ MJ_CONTACT = _only(
     *("dist", "pos", "frame", "includemargin", "friction", "mu"),
     *("dim", "geom", "exclude", "efc_address"),
 )
-MJ_WARNING = _only(structure("mjWarningStat"), "number")
 MJ_OPTION = _only(structure("mjOption"), "timestep", "gravity", "cone", "solver")
 MJ_MODEL = _only(
     structure("mjModel"),
