@@ -101,8 +101,13 @@ def _tasks(runner: Runner, pair: StepPair) -> list[Task]:
 
 def carry_out(runner: Runner, pairs: Iterable[StepPair]) -> Found[list[StepPairResult]]:
     """What was read from pairs; those of which a run broke down are missing."""
+    return (yield from without_missing(results_of(runner, [*pairs])))
+
+
+def without_missing(found: Iterable[StepPairResult | Missing]) -> Found[list[StepPairResult]]:
+    """What was read; what is missing is handed in."""
     results = []
-    for each in results_of(runner, [*pairs]):
+    for each in found:
         if isinstance(each, Missing):
             yield each
         else:

@@ -13,7 +13,7 @@ from compare.method.brackets import Bracket, Search, narrow
 from compare.method.record import Measurement, Missing
 from compare.method.runner import Runner
 from compare.method.settling import SettlingCriteria, SteadyState, settle_groups
-from compare.method.step_pairs import Start, StepPair, StepPairResult, results_of
+from compare.method.step_pairs import Start, StepPair, StepPairResult, results_of, without_missing
 from model import Trajectory
 
 T = TypeVar("T")
@@ -55,8 +55,7 @@ def narrowed(*searches: Search, careful: bool = True) -> Procedure[list[Bracket]
 def stepped(*pairs: StepPair) -> Procedure[list[StepPairResult]]:
     """What was read from pairs of runs; those of which one broke down are missing."""
     found: list[StepPairResult | Missing] = yield Wanted(results_of, (), pairs)
-    yield from (each for each in found if isinstance(each, Missing))
-    return [each for each in found if not isinstance(each, Missing)]
+    return (yield from without_missing(found))
 
 
 def together(
