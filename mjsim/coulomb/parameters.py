@@ -59,8 +59,9 @@ LAW = np.dtype(
 )
 """What compiled code reads of it; restitution is an array of the memory."""
 
-CCD_TOLERANCE = 1e-10
-"""To which colliders find the points of rigid contacts; MuJoCo's own is 1e-6."""
+CCD_TOLERANCE = 1e-14
+"""To which colliders find the points of rigid contacts; MuJoCo's own is 1e-6. Rounding of distances
+then leaves points of round sides up to a few nm off."""
 UNMOVED = 1e-6
 """Distance below which a contact is the one of the same number in the last step, m."""
 ALIKE, FARTHEST = 0.1, 0.2

@@ -672,12 +672,18 @@ def test_geoms_that_cannot_part_come_to_rest(rigid, bodies):
     assert np.abs(data.qvel).max() < 1e-9
 
 
-@pytest.mark.parametrize("shape", ["cylinder", "capsule"])
-def test_what_lies_on_its_smooth_side_stays(shape):
+@pytest.mark.parametrize(
+    ("shape", "place"),
+    [
+        ('type="cylinder" size=".009 .03"', ".003 .002 .069"),
+        ('type="capsule" size=".009 .03"', ".003 .002 .069"),
+        ('type="ellipsoid" size=".03 .01 .02"', ".01 -.007 .07"),
+    ],
+)
+def test_what_lies_on_its_smooth_side_stays(shape, place):
     """Under rigid contacts, whose points colliders must not find a micrometre beside."""
-    slab, lies = '<geom type="box" size=".2 .2 .03" pos="0 0 .03"/>', {"euler": "90 0 0"}
-    rod = free("rod", ".003 .002 .069", f'type="{shape}" size=".009 .03" mass=".05"', **lies)
-    made, data = world(slab + rod)
+    slab = '<geom type="box" size=".2 .2 .03" pos="0 0 .03"/>'
+    made, data = world(slab + free("rod", place, f'{shape} mass=".05"', euler="90 0 0"))
     Coulomb(made, rigid=True).step(data, 1000)
     assert np.abs(data.qvel).max() < 1e-6
     assert made.opt.ccd_tolerance == 1e-6
