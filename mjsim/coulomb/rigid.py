@@ -196,7 +196,7 @@ def in_plane(one: Any, other: Any) -> Any:
 
 
 @kernel
-def share_regularisation(data: Any, memory: Any) -> None:
+def write_regularisation(data: Any, memory: Any) -> None:
     """Tell the R of contacts to all places where MuJoCo keeps it: D, islands."""
     R, D = reals(data.efc_R, data.nefc), reals(data.efc_D, data.nefc)
     island_R, island_D = reals(data.iefc_R, data.nefc), reals(data.iefc_D, data.nefc)

@@ -33,10 +33,10 @@ from .rigid import (
     add_dampers,
     oppose_slip_at_mid_step,
     share_loads,
-    share_regularisation,
     stiffen,
     take_dampers_away,
     take_depth_away,
+    write_regularisation,
 )
 from .rows import (
     add_turning,
@@ -87,7 +87,7 @@ def law_of_a_step(m: int, d: int, at: int) -> None:
     elif rigid:
         oppose_slip_at_mid_step(model, data, memory)
     if rigid:
-        share_regularisation(data, memory)
+        write_regularisation(data, memory)
     write_references(data, memory)
 
 
@@ -156,7 +156,7 @@ def begin(model: Any, data: Any, memory: Any) -> Any:
     start, last = reals(data.qacc_warmstart, model.nv), reals(data.qacc, model.nv)
     touched = memory.law.rigid or data.ncon > 0
     for i in range(model.nv if touched else 0):
-        if memory.ncon < 0 or not known:  # of states that are set MuJoCo keeps but that
+        if memory.ncon < 0 or not known:  # of a state that is set MuJoCo keeps qacc_warmstart alone
             last[i] = start[i]
         if abs(start[i]) < memory.law.calm:
             start[i] = 0.0
@@ -259,7 +259,7 @@ def iterate(model: Any, data: Any, memory: Any, start: Any) -> bool:
     contacts, rows = contacts_of(memory), rows_of(memory)
     acceleration = reals(data.qacc, model.nv)
     if memory.law.rigid:
-        share_regularisation(data, memory)
+        write_regularisation(data, memory)
     for _ in range(memory.law.most):
         write_references(data, memory)
         mj_fwdConstraint(memory.model, memory.data)
