@@ -383,6 +383,8 @@ def check_state(state: Mapping[str, npt.NDArray[Any]], model: Any, law: Law) -> 
         for each in [values[field] for field in fields if field != "velocity"] or [values]:
             if name != "time" and not np.isfinite(each).all():
                 raise ValueError(f"not a state of Coulomb: {name} must be finite")
+    if np.isnan(state["contacts"]["velocity"]).any():  # infinite ones aren't known
+        raise ValueError("not a state of Coulomb: velocity in contacts must be a number")
     if not np.array_equal(state["sizes"], sizes(model)):
         raise ValueError(
             f"not a state of this model, whose {_NAMES} are {sizes(model).tolist()}, "

@@ -337,7 +337,7 @@ def test_states_that_are_none(rigid):
         strange += [state | {name: values.astype(np.float32)}] if values.dtype == float else []
         strange += [state | {name: values[..., None]}]
     strange += [state | {name: np.full_like(state[name], np.nan)} for name in ("joints", "spins")]
-    for field in ("load", "friction", "place"):
+    for field in ("load", "friction", "place", "velocity"):
         far = state["contacts"].copy()
         far[field] = math.nan
         strange += [state | {"contacts": far}]
