@@ -374,6 +374,7 @@ def inherit(model: Any, data: Any, memory: Any, contact: Any, old: Any) -> None:
         contact.velocity[axis] = old.velocity[axis] if known else math.inf
         contact.turned[axis] = old.turned[axis] if alone else 0.0
     contact.state = max(contact.state, old.state)
+    contact.weakened = max(contact.weakened, old.weakened)
     contact.error, contact.lift = max(contact.error, old.error), max(contact.lift, old.lift)
     contact.load += old.load
     for side in range(2):

@@ -35,17 +35,25 @@ def strengthen(data: Any, memory: Any) -> None:
 @kernel
 def weaken(model: Any, data: Any, memory: Any) -> None:
     """Give contacts that slide kinetic friction, mu_k = `kinetic` mu; what stops holds by mu
-    again."""
+    again.
+
+    What sticks gives way in a step in which its friction changes, by h R mu f_n at most; f_n is a
+    weight at least, since others may bear it. Faster than that it begins to slide.
+    """
     contacts, found = contacts_of(memory), engine_contacts(data.contact, data.ncon)
-    velocity = reals(data.efc_vel, data.nefc)
-    slowest = SLOWEST * memory.gravity * model.opt.timestep
+    rows, velocity = rows_of(memory), reals(data.efc_vel, data.nefc)
+    estimate = reals(data.efc_diagA, data.nefc)
     for i in range(memory.contacts):
-        contact, square = contacts[i], 0.0
-        given = found[contact.index]
+        contact, square, gives_way = contacts[i], 0.0, SLOWEST * memory.gravity
+        load = max(rows[contact.address].remembered, memory.gravity / estimate[contact.address])
         for t in range(2 if contact.dim > 1 else 0):
+            row = rows[contact.address + 1 + t]
             square += velocity[contact.address + 1 + t] ** 2
-        contact.weakened = contact.state != STICKS and square > slowest**2
-        scale(contact, given, memory.law.kinetic if contact.weakened else 1.0)
+            if not contact.weakened:
+                gives_way = max(gives_way, row.R * contact.mu[t] * load)
+        slides = contact.state != STICKS and square > (model.opt.timestep * gives_way) ** 2
+        contact.weakened = slides
+        scale(contact, found[contact.index], memory.law.kinetic if slides else 1.0)
 
 
 @kernel

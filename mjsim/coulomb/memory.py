@@ -36,6 +36,7 @@ CONTACT = np.dtype(
     [
         ("geoms", _i4, 2),
         ("state", _i4),
+        ("weakened", _i4),  # whether its friction is kinetic
         # where it is: on each body in the axes of its geom, m; the normal in those of the first
         ("place", _f8, (2, 3)),
         ("normal", _f8, 3),
@@ -65,7 +66,6 @@ CONTACT = np.dtype(
         ("carried", _f8, (3, 2)),  # friction remembered along the frame: axis, force or moment
         ("mu", _f8, 5),  # coefficients of friction: two of sliding, of spin, two of rolling, m
         ("cone", _f8),  # MuJoCo's regular coefficient, of the cone in scaled forces
-        ("weakened", _i4),  # whether they are kinetic
         ("moved", _f8),  # square of how far it has moved on its bodies, m2
         ("closes", _i4),  # whether Newton's method has just found that it does
         ("share", _f8),  # part of friction without a limit that it has

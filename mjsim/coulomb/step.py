@@ -120,8 +120,6 @@ def update_contacts(
 def find_references(model: Any, data: Any, memory: Any, since: float, moved: bool) -> None:
     """Find what rows ask for: MuJoCo's references are mended in mjData, and then read."""
     read_rows(data, memory)
-    if memory.law.kinetic < 1:
-        weaken(model, data, memory)
     multiply(memory, reals(data.qacc, model.nv))
     if memory.law.rigid:
         stiffen(model, data, memory)
@@ -129,6 +127,8 @@ def find_references(model: Any, data: Any, memory: Any, since: float, moved: boo
         take_depth_away(model, data, memory)
     add_turning(model, data, memory, since, moved)
     set_up(data, memory)
+    if memory.law.kinetic < 1:
+        weaken(model, data, memory)
     if memory.law.rigid:
         share_loads(model, memory)
 

@@ -109,9 +109,21 @@ def test_what_slides_has_kinetic_friction_and_what_stops_holds_by_static_frictio
     for _ in range(2):
         assert abs(pull(0.0, 0.995 * mu, 1000)[0]) < 1e-3 * G * h  # held, up to what is soft
         assert pull(0.995 * mu, 1.005 * mu, 200)[0] > G * h  # gone
+        pull(0.45, 0.45, 50)  # until it rocks no more
         _, acceleration = pull(0.45, 0.45, 100)
         assert acceleration == pytest.approx((0.45 - kinetic * mu) * G, rel=1e-4)
         pull(0.0, 0.0, 1000)
+
+
+@WAYS
+@pytest.mark.parametrize("geom", ['type="box" size=".05 .05 .05"', 'type="cylinder" size=".1 .05"'])
+def test_what_is_pulled_suddenly_gives_way_a_little_and_keeps_its_static_friction(rigid, geom):
+    made, data = scene(f'{geom} mass="1"', mu=0.6)
+    law = Coulomb(made, rigid=rigid, kinetic=0.5)
+    law.step(data, 500)
+    data.xfrc_applied[1, 0] = 0.98 * 0.6 * G
+    law.step(data, 500)
+    assert np.abs(data.qvel).max() < 1e-6
 
 
 def test_kinetic_friction_is_not_taken_twice_from_contacts_that_are_asked_again():
