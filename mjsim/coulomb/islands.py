@@ -79,21 +79,21 @@ def root(dofs: Any, i: int) -> int:
 
 
 @kernel
-def find_envelope(model: Any, memory: Any, first: int) -> int:
+def number_island(model: Any, memory: Any, first: int) -> None:
     """Number an island's degrees of freedom, tree by tree, so that rows of its derivative are short
-    (Cuthill and McKee 1969); where they begin, and how far they reach; its size."""
+    (Cuthill and McKee 1969); where they begin, and how far they reach; list its units."""
     starts, columns = integers(model.M_rowadr, model.nv), integers(model.M_colind, model.nC)
-    rows, dofs, size = rows_of(memory), dofs_of(memory), 0
+    rows, dofs, size, units = rows_of(memory), dofs_of(memory), 0, 0
     last = find_levels(memory, first, find_levels(memory, first, first))
     for level in range(dofs[last].level, -1, -1):
         i = first
         while i >= 0:
             if dofs[dofs[i].tree].level == level:
-                dofs[i].place = size
+                dofs[i].place, dofs[size].dof = size, i
                 dofs[size].envelope, dofs[size].reach = dofs[columns[starts[i]]].place, size
                 size += 1
             i = dofs[i].next
-    u = dofs[first].unit
+    unit, u = integers(memory.unit_at, len(rows)), dofs[first].unit
     while u >= 0:
         column, place, least = columns_of(memory, rows[u]), places_of(memory, rows[u]), size
         for n in range(len(place)):
@@ -101,13 +101,13 @@ def find_envelope(model: Any, memory: Any, first: int) -> int:
             least = min(least, place[n])
         for k in place:
             dofs[k].envelope = min(dofs[k].envelope, least)
-        u = rows[u].next
+        unit[units], units, u = u, units + 1, rows[u].next
     for k in range(size):
         begin = dofs[dofs[k].envelope]
         begin.reach = max(begin.reach, k)
     for k in range(1, size):
         dofs[k].reach = max(dofs[k].reach, dofs[k - 1].reach)
-    return size
+    memory.size, memory.units = size, units
 
 
 @kernel

@@ -119,7 +119,8 @@ DOF = np.dtype(
         ("tree", _i4),  # the first one of its kinematic tree
         ("level", _i4),  # of that one: how many units it is from where numbers of the island begin
         ("place", _i4),  # its number in its island
-        ("envelope", _i4),  # where the row of that number begins in the derivative
+        ("dof", _i4),  # which one has this number in the island that is solved
+        ("envelope", _i4),  # where the row of this number begins in the derivative
         ("reach", _i4),  # where it ends in U
     ]
 )
@@ -171,9 +172,12 @@ MEMORY = np.dtype(
         *((f"{name}_at", _i8) for name in ("contact", "before", "row", "jacobian", "column")),
         *((f"{name}_at", _i8) for name in ("dry", "pose", "pair", "point", "xpos", "xmat", "body")),
         *((f"{name}_at", _i8) for name in ("restitution", "dof")),
-        # nv numbers each
-        *((f"{name}_at", _i8) for name in ("residual", "tried", "step", "local")),
-        *((f"{name}_at", _i8) for name in ("matrix", "place")),
+        # the island that is solved: how many degrees of freedom and units it has; by their numbers
+        # in it, accelerations, those tried, a step to these, what is left of the equations
+        ("size", _i8),
+        ("units", _i8),
+        *((f"{name}_at", _i8) for name in ("unit", "island", "tried", "step", "residual")),
+        *((f"{name}_at", _i8) for name in ("local", "matrix", "place")),
         ("inertia_at", _i8),  # M without what brakes, nC
     ],
     align=True,
@@ -212,6 +216,12 @@ def columns_of(memory: Any, row: Any) -> Any:
 def places_of(memory: Any, row: Any) -> Any:
     """The numbers that these have in their island; all rows of a unit have the same."""
     return integers(memory.place_at + 4 * row.first, row.length)
+
+
+@view
+def units_of(memory: Any) -> Any:
+    """The units of the island that is solved, by their first rows."""
+    return integers(memory.unit_at, memory.units)
 
 
 @view
@@ -273,7 +283,7 @@ class Simulation:
         self._own("restitution", np.array(law.restitution, np.float64))
         record["nv"] = nv = model.nv if law.rigid else 0
         self._own("dof", np.zeros(nv, DOF))
-        for name in ("residual", "tried", "step", "local"):
+        for name in ("island", "tried", "step", "residual", "local"):
             self._own(name, np.zeros(nv))
         self._own("matrix", np.zeros((nv, nv)))
         self._own("inertia", np.zeros(model.nC))
@@ -297,7 +307,7 @@ class Simulation:
         wanted = {"contacts": contacts, "rows": rows, "jacobian": jacobian}
         kinds: dict[str, dict[str, Any]] = {
             "contacts": {"contact": CONTACT, "before": CONTACT, "pose": MJ_CONTACT, "pair": PAIR},
-            "rows": {"row": ROW, "dry": np.float64},
+            "rows": {"row": ROW, "dry": np.float64, "unit": np.int32},
             "jacobian": {"jacobian": np.float64, "column": np.int32, "place": np.int32},
         }
         for room, count in wanted.items():

@@ -21,19 +21,19 @@ import numpy as np
 from .compiling import kernel
 from .engine import integers, reals
 from .friction import shift
-from .islands import find_envelope, find_islands, find_units
+from .islands import find_islands, find_units, number_island
 from .memory import (
     DRY,
     ONE_SIDED,
     OPEN,
     SLIDES,
     STICKS,
-    columns_of,
     contacts_of,
     dofs_of,
     jacobians_of,
     places_of,
     rows_of,
+    units_of,
 )
 from .parameters import (
     DECREASE,
@@ -104,40 +104,39 @@ def row_stiffness(row: Any) -> float:
 
 
 @kernel
-def find_residual(model: Any, data: Any, memory: Any, first: int, a: Any) -> float:
-    """M a - q - J' f of an island, with all forces; its square in units of M's diagonal."""
-    dofs, residual, square = dofs_of(memory), reals(memory.residual_at, model.nv), 0.0
+def find_residual(model: Any, data: Any, memory: Any, a: Any) -> float:
+    """M a - q - J' f of the island, with all forces; its square in units of M's diagonal."""
+    dofs, residual, square = dofs_of(memory), reals(memory.residual_at, memory.size), 0.0
     starts, lengths = integers(model.M_rowadr, model.nv), integers(model.M_rownnz, model.nv)
     columns, inertia = integers(model.M_colind, model.nC), reals(data.M, model.nC)
-    smooth, i, u = reals(data.qfrc_smooth, model.nv), first, dofs[first].unit
-    while i >= 0:  # M is a lower triangle, row by row; rows end on the diagonal
-        residual[i] = -smooth[i]
+    smooth = reals(data.qfrc_smooth, model.nv)
+    for k in range(memory.size):  # M is a lower triangle, row by row; rows end on the diagonal
+        i = dofs[k].dof
+        residual[k] = -smooth[i]
         for n in range(starts[i], starts[i] + lengths[i] - 1):
-            residual[i] += inertia[n] * a[columns[n]]
-            residual[columns[n]] += inertia[n] * a[i]
-        residual[i] += inertia[starts[i] + lengths[i] - 1] * a[i]
-        i = dofs[i].next
-    while u >= 0:
-        u = subtract_forces(memory, u, a, residual)
-    i = first
-    while i >= 0:
-        square += residual[i] ** 2 / inertia[starts[i] + lengths[i] - 1]
-        i = dofs[i].next
+            other = columns[n] - i + k  # those of a tree have successive numbers
+            residual[k] += inertia[n] * a[other]
+            residual[other] += inertia[n] * a[k]
+        residual[k] += inertia[starts[i] + lengths[i] - 1] * a[k]
+    for u in units_of(memory):
+        subtract_forces(memory, u, a, residual)
+    for k in range(memory.size):
+        i = dofs[k].dof
+        square += residual[k] ** 2 / inertia[starts[i] + lengths[i] - 1]
     return square
 
 
 @kernel
-def subtract_forces(memory: Any, u: int, a: Any, residual: Any) -> int:
-    """Find the forces of a unit at accelerations `a`, and take J' f off the residual; return the
-    next unit of its island."""
+def subtract_forces(memory: Any, u: int, a: Any, residual: Any) -> None:
+    """Find the forces of a unit at accelerations `a`, and take J' f off the residual."""
     rows, contacts = rows_of(memory), contacts_of(memory)
-    unit, column = rows[u], columns_of(memory, rows[u])
-    jacobian, local = jacobians_of(memory, unit), reals(memory.local_at, len(column))
-    for n in range(len(column)):
-        local[n] = a[column[n]]
+    unit, place = rows[u], places_of(memory, rows[u])
+    jacobian, local = jacobians_of(memory, unit), reals(memory.local_at, len(place))
+    for n in range(len(place)):
+        local[n] = a[place[n]]
     for r in range(unit.dim):
         row, acceleration = rows[u + r], 0.0
-        for n in range(len(column)):
+        for n in range(len(place)):
             acceleration += jacobian[r, n] * local[n]
         row.residual = acceleration - row.reference - row.R * row.held
     if unit.contact < 0:
@@ -145,36 +144,31 @@ def subtract_forces(memory: Any, u: int, a: Any, residual: Any) -> int:
     else:
         contact = contacts[unit.contact]
         contact.state = contact_forces(rows, contact)
-    for n in range(len(column) if unit.force != 0 else 0):
+    for n in range(len(place) if unit.force != 0 else 0):
         force = 0.0
         for r in range(unit.dim):
             force += jacobian[r, n] * rows[u + r].force
-        residual[column[n]] -= force
-    return int(unit.next)
+        residual[place[n]] -= force
 
 
 @kernel
-def assemble(model: Any, data: Any, memory: Any, first: int, matrix: Any) -> None:
-    """The derivative of the residual of an island."""
+def assemble(model: Any, data: Any, memory: Any, matrix: Any) -> None:
+    """The derivative of the residual of the island."""
     rows, contacts, dofs = rows_of(memory), contacts_of(memory), dofs_of(memory)
     starts, lengths = integers(model.M_rowadr, model.nv), integers(model.M_rownnz, model.nv)
     columns, inertia = integers(model.M_colind, model.nC), reals(data.M, model.nC)
-    for k in range(len(matrix)):
+    for k in range(memory.size):
         for n in range(dofs[k].envelope, dofs[k].reach + 1):
             matrix[k, n] = 0.0
-    i = first
-    while i >= 0:
-        k = dofs[i].place
+    for k in range(memory.size):
+        i = dofs[k].dof
         for n in range(starts[i], starts[i] + lengths[i]):
-            m = dofs[columns[n]].place
-            matrix[k, m] = matrix[m, k] = inertia[n]
-        i = dofs[i].next
-    u = dofs[first].unit
-    while u >= 0:
+            other = columns[n] - i + k
+            matrix[k, other] = matrix[other, k] = inertia[n]
+    for u in units_of(memory):
         if rows[u].force != 0:
             find_stiffness(rows, contacts, u)
             add_unit(memory, rows, u, matrix)
-        u = rows[u].next
 
 
 @kernel
@@ -234,65 +228,58 @@ def substitute(matrix: Any, dofs: Any, x: Any) -> None:
 
 
 @kernel
-def solve_island(model: Any, data: Any, memory: Any, first: int, a: Any, exactness: float) -> bool:
-    """Newton's method for the accelerations of an island, to a part of the forces without contacts;
-    whether it came to an end."""
-    dofs, size = dofs_of(memory), find_envelope(model, memory, first)
+def solve_island(model: Any, data: Any, memory: Any, exactness: float) -> bool:
+    """Newton's method for the accelerations of the island, to a part of the forces without
+    contacts; whether it came to an end."""
+    dofs, size = dofs_of(memory), memory.size
     matrix, step = reals(memory.matrix_at, (size, size)), reals(memory.step_at, size)
-    residual, tried = reals(memory.residual_at, model.nv), reals(memory.tried_at, model.nv)
-    enough = exactness * forces_without_contacts(model, data, memory, first)
-    square = find_residual(model, data, memory, first, a)
+    a, tried = reals(memory.island_at, size), reals(memory.tried_at, size)
+    residual = reals(memory.residual_at, size)
+    enough = exactness * forces_without_contacts(model, data, memory)
+    square = find_residual(model, data, memory, a)
     for _ in range(STEPS):
         if square <= enough**2:
             return True
-        assemble(model, data, memory, first, matrix)
+        assemble(model, data, memory, matrix)
         factorise(matrix, dofs)
         memory.factorisations += 1
-        i = first
-        while i >= 0:
-            step[dofs[i].place] = -residual[i]
-            i = dofs[i].next
+        for k in range(size):
+            step[k] = -residual[k]
         substitute(matrix, dofs, step)
         share, before = 1.0, square
         while True:
-            i = first
-            while i >= 0:
-                tried[i] = a[i] + share * step[dofs[i].place]
-                i = dofs[i].next
-            square = find_residual(model, data, memory, first, tried)
+            for k in range(size):
+                tried[k] = a[k] + share * step[k]
+            square = find_residual(model, data, memory, tried)
             if square <= (1 - DECREASE * share) ** 2 * before or share < SHORTEST:
                 break
             share *= FEWER
-        i = first
-        while i >= 0:
-            a[i] = tried[i]
-            i = dofs[i].next
+        for k in range(size):
+            a[k] = tried[k]
     return False
 
 
 @kernel
-def forces_without_contacts(model: Any, data: Any, memory: Any, first: int) -> float:
-    """The size of the forces on an island without contacts, in units of M's diagonal."""
+def forces_without_contacts(model: Any, data: Any, memory: Any) -> float:
+    """The size of the forces on the island without contacts, in units of M's diagonal."""
     starts, lengths = integers(model.M_rowadr, model.nv), integers(model.M_rownnz, model.nv)
     inertia, smooth, square = reals(data.M, model.nC), reals(data.qfrc_smooth, model.nv), 1e-12
-    dofs, i = dofs_of(memory), first
-    while i >= 0:
+    dofs = dofs_of(memory)
+    for k in range(memory.size):
+        i = dofs[k].dof
         square += smooth[i] ** 2 / inertia[starts[i] + lengths[i] - 1]
-        i = dofs[i].next
     return math.sqrt(square)
 
 
 @kernel
-def hold_forces(memory: Any, first: int) -> float:
-    """Let contacts hold their forces; by how much R made them give way, m s-2."""
+def hold_forces(memory: Any) -> float:
+    """Let the contacts of the island hold their forces; by how much R made them give way, m s-2."""
     rows, worst = rows_of(memory), 0.0
-    u = dofs_of(memory)[first].unit
-    while u >= 0:
+    for u in units_of(memory):
         for r in range(u, u + rows[u].dim if rows[u].contact >= 0 else u):
             row = rows[r]
             worst = max(worst, row.R * abs(row.force - row.held))
             row.held = row.remembered = row.force
-        u = rows[u].next
     return worst
 
 
@@ -341,45 +328,48 @@ def solve_closed(model: Any, data: Any, memory: Any, a: Any, everywhere: bool) -
     closed; whether all came to an end."""
     find_units(memory)
     find_islands(model, memory, everywhere)
-    dofs = dofs_of(memory)
+    dofs, own, solved = dofs_of(memory), reals(memory.island_at, memory.nv), True
     for first in range(model.nv):
-        due = dofs[first].label == first and dofs[first].due
-        if due and not solve_rigid_island(model, data, memory, first, a):
-            return False
-    return True
+        if solved and dofs[first].label == first and dofs[first].due:
+            number_island(model, memory, first)
+            for k in range(memory.size):
+                own[k] = a[dofs[k].dof]
+            solved = solve_rigid_island(model, data, memory)
+            for k in range(memory.size):
+                a[dofs[k].dof] = own[k]
+    return solved
 
 
 @kernel
-def solve_rigid_island(model: Any, data: Any, memory: Any, first: int, a: Any) -> bool:
+def solve_rigid_island(model: Any, data: Any, memory: Any) -> bool:
     """Solve an island until R makes its contacts give way no more, m s-2: proximal point method.
 
     R falls from solution to solution, so that they come near sooner (Rockafellar 1976); it grows
     where Newton's method comes to no end. Then it is again what it was.
     """
     gives_way, last, scale, solved, least = math.inf, math.inf, R_RISES, True, False
-    multiply_R(memory, first, scale)
+    multiply_R(memory, scale)
     for _ in range(memory.law.most):
         if least and solved and gives_way <= memory.enough and gives_way >= FALLING * last:
             break
         least |= scale <= R_LEAST
-        solved = solve_island(model, data, memory, first, a, EXACT if least else ROUGH)
+        solved = solve_island(model, data, memory, EXACT if least else ROUGH)
         factor = R_RISES
         if solved:
-            last, gives_way = gives_way, hold_forces(memory, first)
+            last, gives_way = gives_way, hold_forces(memory)
             factor = R_LEAST / scale
             if gives_way > NEAR * memory.enough:
                 factor = max(R_FALLS, factor)
         scale *= factor
-        multiply_R(memory, first, factor)
-    multiply_R(memory, first, 1 / scale)
+        multiply_R(memory, factor)
+    multiply_R(memory, 1 / scale)
     return solved and gives_way <= memory.enough
 
 
 @kernel
-def multiply_R(memory: Any, first: int, factor: float) -> None:
-    """Multiply R of the contacts of an island."""
-    rows, u = rows_of(memory), dofs_of(memory)[first].unit
-    while u >= 0:
+def multiply_R(memory: Any, factor: float) -> None:
+    """Multiply R of the contacts of the island."""
+    rows = rows_of(memory)
+    for u in units_of(memory):
         for r in range(u, u + rows[u].dim if rows[u].contact >= 0 else u):
             rows[r].R *= factor
-        u = rows[u].next
