@@ -11,6 +11,7 @@ from typing import Any
 from .compiling import kernel
 from .engine import integers
 from .memory import CONTACT_ROW, OPEN, columns_of, contacts_of, dofs_of, places_of, rows_of
+from .parameters import BLOCK
 
 
 @kernel
@@ -103,6 +104,7 @@ def number_island(model: Any, memory: Any, first: int) -> None:
             dofs[k].envelope = min(dofs[k].envelope, least)
         unit[units], units, u = u, units + 1, rows[u].next
     for k in range(size):
+        dofs[k].envelope -= dofs[k].envelope % BLOCK
         begin = dofs[dofs[k].envelope]
         begin.reach = max(begin.reach, k)
     for k in range(1, size):

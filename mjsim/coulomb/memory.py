@@ -29,6 +29,8 @@ NEW, OPEN, STICKS, SLIDES = range(4)
 """State of a contact."""
 FORCE, MOMENT = range(2)
 """Kind of friction: along an axis, of sliding; about it, of spin and rolling."""
+MOST_ROWS = 6
+"""Of a contact."""
 
 _f8, _i4, _i8 = np.float64, np.int32, np.int64
 
@@ -103,7 +105,7 @@ ROW = np.dtype(
         ("residual", _f8),
         ("force", _f8),  # as found, N
         # minus its derivatives by the residuals of the rows of its unit, kg, in Newton's method
-        ("stiffness", _f8, 6),
+        ("stiffness", _f8, MOST_ROWS),
         ("limit", _f8),  # the most that a dry joint bears, N or N m
     ],
     align=True,
@@ -177,7 +179,8 @@ MEMORY = np.dtype(
         ("size", _i8),
         ("units", _i8),
         *((f"{name}_at", _i8) for name in ("unit", "island", "tried", "step", "residual")),
-        *((f"{name}_at", _i8) for name in ("local", "matrix", "place")),
+        ("local_at", _i8),  # a number for each row of a unit
+        *((f"{name}_at", _i8) for name in ("matrix", "place")),
         ("inertia_at", _i8),  # M without what brakes, nC
     ],
     align=True,
@@ -283,8 +286,9 @@ class Simulation:
         self._own("restitution", np.array(law.restitution, np.float64))
         record["nv"] = nv = model.nv if law.rigid else 0
         self._own("dof", np.zeros(nv, DOF))
-        for name in ("island", "tried", "step", "residual", "local"):
+        for name in ("island", "tried", "step", "residual"):
             self._own(name, np.zeros(nv))
+        self._own("local", np.zeros(MOST_ROWS))
         self._own("matrix", np.zeros((nv, nv)))
         self._own("inertia", np.zeros(model.nC))
         self._own("xpos", np.zeros((model.nbody, 3)))

@@ -36,6 +36,7 @@ from .memory import (
     units_of,
 )
 from .parameters import (
+    BLOCK,
     DECREASE,
     EXACT,
     FALLING,
@@ -109,7 +110,7 @@ def find_residual(model: Any, data: Any, memory: Any, a: Any) -> float:
     dofs, residual, square = dofs_of(memory), reals(memory.residual_at, memory.size), 0.0
     starts, lengths = integers(model.M_rowadr, model.nv), integers(model.M_rownnz, model.nv)
     columns, inertia = integers(model.M_colind, model.nC), reals(data.M, model.nC)
-    smooth = reals(data.qfrc_smooth, model.nv)
+    smooth, rows = reals(data.qfrc_smooth, model.nv), rows_of(memory)
     for k in range(memory.size):  # M is a lower triangle, row by row; rows end on the diagonal
         i = dofs[k].dof
         residual[k] = -smooth[i]
@@ -119,7 +120,10 @@ def find_residual(model: Any, data: Any, memory: Any, a: Any) -> float:
             residual[other] += inertia[n] * a[k]
         residual[k] += inertia[starts[i] + lengths[i] - 1] * a[k]
     for u in units_of(memory):
-        subtract_forces(memory, u, a, residual)
+        if rows[u].dim == 3:  # loops of a length that is known are faster
+            subtract_forces(memory, rows, u, 3, a, residual)
+        else:
+            subtract_forces(memory, rows, u, rows[u].dim, a, residual)
     for k in range(memory.size):
         i = dofs[k].dof
         square += residual[k] ** 2 / inertia[starts[i] + lengths[i] - 1]
@@ -127,28 +131,31 @@ def find_residual(model: Any, data: Any, memory: Any, a: Any) -> float:
 
 
 @kernel
-def subtract_forces(memory: Any, u: int, a: Any, residual: Any) -> None:
+def subtract_forces(memory: Any, rows: Any, u: int, dim: int, a: Any, residual: Any) -> None:
     """Find the forces of a unit at accelerations `a`, and take J' f off the residual."""
-    rows, contacts = rows_of(memory), contacts_of(memory)
-    unit, place = rows[u], places_of(memory, rows[u])
-    jacobian, local = jacobians_of(memory, unit), reals(memory.local_at, len(place))
-    for n in range(len(place)):
-        local[n] = a[place[n]]
-    for r in range(unit.dim):
+    unit, place, jacobian = rows[u], places_of(memory, rows[u]), jacobians_of(memory, rows[u])
+    force = reals(memory.local_at, dim)
+    for r in range(dim):
         row, acceleration = rows[u + r], 0.0
         for n in range(len(place)):
-            acceleration += jacobian[r, n] * local[n]
+            acceleration += jacobian[r, n] * a[place[n]]
         row.residual = acceleration - row.reference - row.R * row.held
+        if unit.contact >= 0 and unit.residual >= 0:
+            break  # it is open, and what else there is of it tells nothing
     if unit.contact < 0:
         unit.force = row_force(unit)
     else:
-        contact = contacts[unit.contact]
+        contact = contacts_of(memory)[unit.contact]
         contact.state = contact_forces(rows, contact)
-    for n in range(len(place) if unit.force != 0 else 0):
-        force = 0.0
-        for r in range(unit.dim):
-            force += jacobian[r, n] * rows[u + r].force
-        residual[place[n]] -= force
+    if unit.force == 0:
+        return
+    for r in range(dim):
+        force[r] = rows[u + r].force
+    for n in range(len(place)):
+        whole = 0.0
+        for r in range(dim):
+            whole += jacobian[r, n] * force[r]
+        residual[np.uint64(place[n])] -= whole
 
 
 @kernel
@@ -168,7 +175,10 @@ def assemble(model: Any, data: Any, memory: Any, matrix: Any) -> None:
     for u in units_of(memory):
         if rows[u].force != 0:
             find_stiffness(rows, contacts, u)
-            add_unit(memory, rows, u, matrix)
+            if rows[u].dim == 3:  # as above
+                add_unit(memory, rows, u, 3, matrix)
+            else:
+                add_unit(memory, rows, u, rows[u].dim, matrix)
 
 
 @kernel
@@ -184,35 +194,50 @@ def find_stiffness(rows: Any, contacts: Any, u: int) -> None:
 
 
 @kernel
-def add_unit(memory: Any, rows: Any, u: int, matrix: Any) -> None:
+def add_unit(memory: Any, rows: Any, u: int, dim: int, matrix: Any) -> None:
     """Add J' K J of a unit, K being its stiffness, row by row."""
     place, jacobian = places_of(memory, rows[u]), jacobians_of(memory, rows[u])
-    added = reals(memory.local_at, len(place))
+    factor = reals(memory.local_at, dim)
     for n in range(len(place)):
-        for k in range(len(place)):
-            added[k] = 0.0
-        for s in range(len(jacobian)):
-            factor = 0.0
-            for r in range(len(jacobian)):
-                factor += jacobian[r, n] * rows[u + r].stiffness[s]
-            for k in range(len(place)):
-                added[k] += factor * jacobian[s, k]
         own = matrix[place[n]]
+        for s in range(dim):
+            factor[s] = 0.0
+            for r in range(dim):
+                factor[s] += jacobian[r, n] * rows[u + r].stiffness[s]
         for k in range(len(place)):
-            own[np.uint64(place[k])] += added[k]
+            added = 0.0
+            for s in range(dim):
+                added += factor[s] * jacobian[s, k]
+            own[np.uint64(place[k])] += added
 
 
 @kernel
 def factorise(matrix: Any, dofs: Any) -> None:
     """L and U in the matrix's place. No pivots are chosen: a large R keeps diagonals large."""
     for i in range(len(matrix)):
-        own = matrix[i]
-        for k in range(dofs[i].envelope, i):
+        own, together = matrix[i], i - i % BLOCK
+        for k in range(dofs[i].envelope, together, BLOCK):
+            subtract_block(matrix, own, k, dofs[k].reach)
+        for k in range(together, i):
             other = matrix[k]
             own[k] /= other[k]
-            # numbers without a sign: numba then needs no look at negative ones
             for j in range(np.uint64(k + 1), np.uint64(dofs[k].reach + 1)):
                 own[j] -= own[k] * other[j]
+
+
+@kernel
+def subtract_block(matrix: Any, own: Any, k: int, reach: int) -> None:
+    """Take multiples of `BLOCK` rows off another one, in which their diagonals' columns are then
+    factors of L."""
+    a, b, c, d = matrix[k], matrix[k + 1], matrix[k + 2], matrix[k + 3]
+    x = own[k] / a[k]
+    y = (own[k + 1] - x * a[k + 1]) / b[k + 1]
+    z = (own[k + 2] - x * a[k + 2] - y * b[k + 2]) / c[k + 2]
+    w = (own[k + 3] - x * a[k + 3] - y * b[k + 3] - z * c[k + 3]) / d[k + 3]
+    own[k], own[k + 1], own[k + 2], own[k + 3] = x, y, z, w
+    # numbers without a sign: numba then needs no look at negative ones
+    for j in range(np.uint64(k + 4), np.uint64(reach + 1)):
+        own[j] -= x * a[j] + y * b[j] + z * c[j] + w * d[j]
 
 
 @kernel
