@@ -35,10 +35,10 @@ WORDS = SIZE // 8
 
 
 @kernel
-def smaller_radius(model: Any, contact: Any) -> float:
-    """The smaller radius of the two geoms in contact, m; planes have none."""
+def smaller_radius(model: Any, geoms: Any) -> float:
+    """The smaller radius of two geoms, m; planes have none."""
     radius = reals(model.geom_rbound, model.ngeom)
-    one, other = radius[contact.geoms[0]], radius[contact.geoms[1]]
+    one, other = radius[geoms[0]], radius[geoms[1]]
     return float(min(one, other) or max(one, other))
 
 
@@ -110,9 +110,11 @@ def nothing_moved(model: Any, data: Any, memory: Any) -> bool:
             return False
         if pose.efc_address != contact.efc_address or not stayed(contact.frame, pose.frame):
             return False
+        near = FLUSH * smaller_radius(model, contact.geom)
         for j in range(3):
-            moved = FLUSH * abs(contact.pos[j] - pose.pos[j])
-            if not max(moved, abs(contact.friction[j] - pose.friction[j])) < STILL:
+            if not abs(contact.pos[j] - pose.pos[j]) <= near:
+                return False
+            if not abs(contact.friction[j] - pose.friction[j]) < STILL:
                 return False
     return True
 
@@ -403,7 +405,7 @@ def is_fixed(model: Any, memory: Any, old: Any, turning: float) -> bool:
     for axis in range(3 if old.state == STICKS else 0):
         creep += old.velocity[axis] ** 2
     carried = old.belt if old.state == STICKS else 0.0
-    rolled = memory.law.fixed * turning * smaller_radius(model, old)
+    rolled = memory.law.fixed * turning * smaller_radius(model, old.geoms)
     way = model.opt.timestep * (rolled + carried + math.sqrt(creep))
     return bool(old.moved <= 2 * way**2)
 
@@ -415,7 +417,7 @@ def rolls(model: Any, memory: Any, contact: Any, old: Any) -> bool:
         return False
     one, other = math.sqrt(square_way(contact, old, 0)), math.sqrt(square_way(contact, old, 1))
     alike = abs(one - other) <= ALIKE * max(one, other)
-    return bool(alike and max(one, other) <= FARTHEST * smaller_radius(model, old))
+    return bool(alike and max(one, other) <= FARTHEST * smaller_radius(model, old.geoms))
 
 
 @kernel

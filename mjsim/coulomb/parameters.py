@@ -73,7 +73,8 @@ step."""
 STILL = 1e-9
 """Most that contacts and bodies may move, m or rad, for their Jacobians to stay as they are."""
 FLUSH = 1e-3
-"""Part of how far points of contact move that counts there: those of flush faces shift by µm."""
+"""Most that points of contact may move for that, in units of the smaller radius: those of flush
+faces shift."""
 ALIGNED = 1e-3
 """By how much the cosine of the angle between normals of one face is less than 1, at most."""
 EDGE = 1e-3

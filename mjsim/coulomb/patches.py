@@ -116,7 +116,7 @@ def lies_below(model: Any, data: Any, edge: Any, floor: Any) -> bool:
             for j in range(3):
                 along += up * floor.frame[0, j] * xmat[piece, j, axis]
             top += along * boxes[piece, axis] + abs(along) * boxes[piece, 3 + axis]
-        if top > EDGE * smaller_radius(model, edge):
+        if top > EDGE * smaller_radius(model, edge.geoms):
             return False
         below = True
     return below

@@ -55,7 +55,7 @@ def is_moved_by_hand(model: Any, contact: Any) -> bool:
 def depth_kept(model: Any, memory: Any, contact: Any) -> float:
     """Depth that a rigid contact keeps, m."""
     scale = (model.opt.timestep / USUAL_STEP) ** 2
-    return float(memory.law.depth * scale * smaller_radius(model, contact))
+    return float(memory.law.depth * scale * smaller_radius(model, contact.geoms))
 
 
 @kernel
