@@ -26,16 +26,16 @@ def stiffen(model: Any, data: Any, memory: Any) -> None:
     """Make contacts stiff, and let them ask for velocities at the end of the step."""
     contacts, h = contacts_of(memory), model.opt.timestep
     estimate, velocity = reals(data.efc_diagA, data.nefc), reals(data.efc_vel, data.nefc)
-    R, reference = reals(data.efc_R, data.nefc), reals(data.efc_aref, data.nefc)
+    rows = rows_of(memory)
     for i in range(memory.contacts):
         contact, first = contacts[i], contacts[i].address
         goal = velocity_to_ask_for(model, memory, contact, estimate[first])
         if memory.bounces:
             goal = bounced(model, data, memory, contact, goal)
-        factor = memory.law.regularisation * estimate[first] / R[first]
+        factor = memory.law.regularisation * estimate[first] / rows[first].R
         for r in range(first, first + contact.dim):
-            R[r] *= factor
-            reference[r] = ((goal if r == first else 0.0) - velocity[r]) / h
+            rows[r].R *= factor
+            rows[r].reference = ((goal if r == first else 0.0) - velocity[r]) / h
 
 
 @kernel
@@ -214,7 +214,7 @@ def take_depth_away(model: Any, data: Any, memory: Any) -> None:
     """Baumgarte stabilisation: move the distance that a soft contact holds, until under its load it
     has no depth."""
     contacts, spring = contacts_of(memory), reals(data.efc_KBIP, (data.nefc, 4))
-    reference = reals(data.efc_aref, data.nefc)
+    rows = rows_of(memory)
     for i in range(memory.contacts):
         contact = contacts[i]
         lift = contact.lift - model.opt.timestep / memory.law.servo * contact.gap
@@ -222,7 +222,7 @@ def take_depth_away(model: Any, data: Any, memory: Any) -> None:
         stiffness = spring[contact.address, 0] * spring[contact.address, 2]
         closed = contact.lift > 0 or contact.gap <= 0
         push = stiffness * (contact.margin - contact.lift) if closed else APART
-        reference[contact.address] -= push
+        rows[contact.address].reference -= push
 
 
 @kernel

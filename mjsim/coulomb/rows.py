@@ -37,26 +37,19 @@ def find_surfaces(model: Any, data: Any, memory: Any) -> None:
 
 
 @kernel
-def set_up(data: Any, memory: Any) -> None:
-    """Read regularisation and reference acceleration of all rows; of soft contacts, friction is
-    held."""
+def read_rows(data: Any, memory: Any) -> None:
+    """Read MuJoCo's regularisation and reference acceleration of all rows. They hold what they
+    remember, but for the loads of soft contacts."""
     contacts, rows = contacts_of(memory), rows_of(memory)
     R, reference = reals(data.efc_R, data.nefc), reals(data.efc_aref, data.nefc)
     for r in range(len(rows)):
         row = rows[r]
-        row.R, row.reference, row.held = R[r], reference[r], row.remembered
+        row.R = row.given_R = R[r]
+        row.reference = row.given_reference = reference[r]
+        row.held = row.remembered
     if not memory.law.rigid:
         for i in range(memory.contacts):
             rows[contacts[i].address].held = 0.0
-
-
-@kernel
-def read_rows(data: Any, memory: Any) -> None:
-    """Note what MuJoCo has given as regularisation and reference acceleration of all rows."""
-    rows = rows_of(memory)
-    R, reference = reals(data.efc_R, data.nefc), reals(data.efc_aref, data.nefc)
-    for r in range(len(rows)):
-        rows[r].given_R, rows[r].given_reference = R[r], reference[r]
 
 
 @kernel
@@ -114,8 +107,8 @@ def add_turning(model: Any, data: Any, memory: Any, since: float, moved: bool) -
     then friction does no work, before the turning or after it. Rigid contacts lose all, and a disc
     that precesses keeps its energy. A call at the time of the last one, `since` 0 s, adds the same.
     """
-    contacts, velocity = contacts_of(memory), reals(data.efc_vel, data.nefc)
-    reference, rigid = reals(data.efc_aref, data.nefc), memory.law.rigid
+    contacts, rows, rigid = contacts_of(memory), rows_of(memory), memory.law.rigid
+    velocity = reals(data.efc_vel, data.nefc)
     damping = reals(data.efc_KBIP, (data.nefc, 4))
     for i in range(memory.contacts):
         contact = contacts[i]
@@ -131,4 +124,4 @@ def add_turning(model: Any, data: Any, memory: Any, since: float, moved: bool) -
                 for j in range(3):
                     change -= contact.frame[axis, j] * contact.velocity[j]
                 contact.turned[axis] = change * (1 - (1.0 if rigid else lost) / 2) / since
-            reference[contact.address + axis] -= contact.turned[axis]
+            rows[contact.address + axis].reference -= contact.turned[axis]

@@ -44,7 +44,6 @@ from .rows import (
     multiply,
     put_rows_back,
     read_rows,
-    set_up,
     store_velocities,
     write_references,
 )
@@ -118,7 +117,7 @@ def update_contacts(
 
 @kernel
 def find_references(model: Any, data: Any, memory: Any, since: float, moved: bool) -> None:
-    """Find what rows ask for: MuJoCo's references are mended in mjData, and then read."""
+    """Find what rows ask for: MuJoCo's references, mended."""
     read_rows(data, memory)
     multiply(memory, reals(data.qacc, model.nv))
     if memory.law.rigid:
@@ -126,7 +125,6 @@ def find_references(model: Any, data: Any, memory: Any, since: float, moved: boo
     elif memory.law.servo:
         take_depth_away(model, data, memory)
     add_turning(model, data, memory, since, moved)
-    set_up(data, memory)
     if memory.law.kinetic < 1:
         weaken(model, data, memory)
     if memory.law.rigid:
