@@ -139,7 +139,7 @@ def read_gaps(data: Any, memory: Any) -> None:
 def find(model: Any, data: Any, memory: Any) -> None:
     """Find the contacts of a step, their places on both bodies, and their constraint rows.
 
-    Those of flexes, and those that soft contacts leave without friction, are MuJoCo's own.
+    Those of flexes, and soft ones without friction or damping, are MuJoCo's own.
     """
     nonzeros = jacobian_length(model, data, memory)
     if (

@@ -39,8 +39,8 @@ class Law:
     near: float = 0.01
     """Share of the larger radius up to which two points of contact count as one."""
     fixed: float = 0.1
-    """Share of what their turning moves the smaller radius up to which a contact that moves on its
-    bodies, but for its creep, is fixed on them; what rolls isn't."""
+    """Up to this share of the smaller radius times the angle by which its bodies turn in a step, a
+    contact may move on them, beside its creep, and still counts as fixed; what rolls moves more."""
     fast: float = 3.0
     """Slip of a rigid contact, in units of its change in a step, above which it slides on: friction
     opposes its slip in the middle of the step, else that at the end, which may be none."""
