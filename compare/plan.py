@@ -203,10 +203,10 @@ class Sampling:
     # whether that is measured that takes long: sinking next to the least flow that holds, folds
     slow: bool = True
 
-    # settling: lengths of successive rounds, in units of `settling.SPAN`. The later ones are
-    # longer, because a ball on the wall that goes on from its mean swings again, if less, and that
-    # has to die out, too.
-    settling_rounds: tuple[float, ...] = (1.0, 1.0, 2.0, 2.0)
+    # settling: lengths of successive rounds, in units of `settling.SPAN`. Most balls settle within
+    # two or three quarters. The later ones are longer, because a ball on the wall that goes on from
+    # its mean swings again, if less, and that has to die out, too.
+    settling_rounds: tuple[float, ...] = (*(0.25,) * 6, 1.0, 1.0, 2.0)
 
     # settled: flows omega_0 sqrt(R/g) for every kind of start, the first one that which comes to
     # slip
@@ -217,7 +217,7 @@ class Sampling:
 
     thresholds_width: float = 5e-5  # relative width of the last brackets
     thresholds_fold: float = 6e-4  # and of those about a fold
-    thresholds_loose: float = 10.0  # factor on the settling tolerance
+    thresholds_loose: float = 1.0  # factor on the settling tolerance
     thresholds_rounds: tuple[float, ...] = ()  # as settling_rounds; none: those
 
     edge_flows: Flows = (0.3,)  # parts of the way from omega_02 to omega_04
@@ -225,7 +225,8 @@ class Sampling:
     edge_time: float = 20.0  # of a run in units of 1/c
     plane_spread: int = 8  # points spread evenly over each plane
     plane_added: tuple[int, ...] = (4,)  # and in each round
-    plane_rounds: tuple[float, ...] = (1.0, 2.0, 2.0)  # as settling_rounds, in units of half of it
+    # as settling_rounds, in units of half of it
+    plane_rounds: tuple[float, ...] = (*(0.25,) * 4, 2.0, 2.0)
     hysteresis_hold: float = 40.0  # how long each level of the loop is held, in units of 1/c
     hysteresis_parts: int = 2  # of a gap in which a case changes
     slope_slipping: int = 2  # slipping states of a set at which it is measured, at most
@@ -264,11 +265,11 @@ class Sampling:
 # fmt: off
 AT_QUICK = Sampling()  # what others change stands below, a line a protocol
 AT_DEFAULT = replace(
-    AT_QUICK, sections=7,
+    AT_QUICK, sections=7, settling_rounds=(1.0, 1.0, 2.0, 2.0),
     settled_starts=tuple((how, _FLOWS) for how in _STARTS), settled_sharp=0.1,
-    thresholds_width=1e-6, thresholds_fold=3e-4, thresholds_loose=1.0,
+    thresholds_width=1e-6, thresholds_fold=3e-4,
     edge_flows=(0.1, 0.17, 0.26, 0.38, 0.6), edge_lines=4, edge_time=60.0,
-    plane_spread=160, plane_added=(60, 60, 60),
+    plane_spread=160, plane_added=(60, 60, 60), plane_rounds=(1.0, 2.0, 2.0),
     hysteresis_hold=60.0, hysteresis_parts=4,
     slope_slipping=20,
     unsteady_lasts=48.0, unsteady_rates=(2.5e-3, 5e-3, 1e-2),
@@ -304,12 +305,11 @@ AT_FULL = replace(
 OWN_STEPS = replace(
     # the same run twice: all numbers are extrapolated to a zero step from several
     AT_QUICK, halves=(2, 2), field_steps=(2, 2, 2), granted=True, slow=False,
-    settling_rounds=(0.45, 1.0, 1.0),
+    settling_rounds=(*(0.25,) * 6, 1.0),
     settled_starts=(("with the fluid", (0.62, 1.7, 4.2)), ("on the wall", (1.7, 4.2))),
     settled_loose=100.0,
     settled_divisor=1,
-    thresholds_width=5e-4, thresholds_loose=1e4, thresholds_rounds=(0.4, 1.0),
-    plane_rounds=(1.0, 2.0),
+    thresholds_width=5e-4,
     hysteresis_hold=15.0, hysteresis_parts=1,
     unsteady_lasts=24.0, unsteady_divisors=(2, 2), unsteady_ramps=(1, 1), unsteady_rates=(4e-2,),
     # where friction creeps, slip counts as such later
@@ -323,6 +323,11 @@ OWN_STEPS = replace(
 )
 # fmt: on
 OWN_STEPS_ABOVE_QUICK = replace(
-    OWN_STEPS, thresholds_loose=1e3, thresholds_rounds=(1.0, 2.0), unsteady_lasts=48.0
+    OWN_STEPS,
+    settling_rounds=(0.45, 1.0, 1.0),
+    plane_rounds=(1.0, 2.0),
+    thresholds_loose=1e3,
+    thresholds_rounds=(1.0, 2.0),
+    unsteady_lasts=48.0,
 )
 """At the levels above quick, on whose rarer sets motions die out more slowly."""

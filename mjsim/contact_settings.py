@@ -84,8 +84,8 @@ class RigidContacts:
         """Slip speed (m s-1) below which a contact counts as rolling, under such a force."""
         return PREDICTED / YIELDS * self.creep_speed(load)
 
-    def touching(self, g: float) -> float:
-        """Gap (m) within which a ball at the start counts as touching."""
+    def touching(self, load: float) -> float:
+        """Gap (m) within which a ball at the start counts as touching, under a load (m s-2)."""
         return 0.0
 
 
@@ -186,10 +186,10 @@ class ContactSettings:
         rolls, m; slip lifts it."""
         return self.regularisation * load / self.k
 
-    def touching(self, g: float) -> float:
-        """Gap (m) within which a ball at the start counts as touching: twice the depth to which
-        gravity presses it."""
-        return 2 * self.depth(g)
+    def touching(self, load: float) -> float:
+        """Gap (m) within which a ball at the start counts as touching: twice the depth to which a
+        load (m s-2) presses it."""
+        return 2 * self.depth(load)
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> Self:

@@ -177,7 +177,8 @@ def check_run(
             stacklevel=4,
         )
     check_timestep(settings.timestep, p, flow, t_end, x0)
-    check_place(x0, p, max(settings.touching(p.g), DEEP * p.R))
+    load = p.g + p.R * float(x0.omega_c) ** 2  # on the floor, and on the wall
+    check_place(x0, p, max(settings.touching(load), DEEP * p.R))
     return sampling(t_end, settings.timestep, sample_interval)
 
 

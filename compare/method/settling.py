@@ -32,6 +32,10 @@ SHORT = (1 / 64, 1 / 8)
 sooner. The drift limit of such a round is reduced in proportion to its length."""
 STARTED_NEAR = 1 / 4
 """The round before those where a ball begins from what it settled to with a longer step."""
+SWINGS = 100.0
+"""Swing divided by drift from which on a ball but swings about its mean. (Of what dies out without
+swinging it is about five.)"""
+AS_IT_COMES = 0.45  #: the one round of an engine as it comes
 STEPS_A_SAMPLE = 8
 """A coarse step is about a twentieth of sqrt(R/g), and the ball goes round more slowly."""
 SOLVED = 1e-12
@@ -64,6 +68,7 @@ class SteadyState:
     task: Task = field(repr=False)
     excess: float = math.inf  #: drift or swing divided by its limit for a comparison with theory
     failure: str = ""  #: why it doesn't count as settled
+    swings: bool = False  #: whether it swings about a mean that is all but at rest
 
     def settled_in(self, *cases: Case) -> bool:
         """Whether it counts as settled, in one of these cases."""
@@ -89,14 +94,15 @@ def settle(
 ) -> list[SteadyState]:
     """Run the ball from each start until it is settled; the states, in order.
 
-    Of an engine as it comes every state counts, for what it is after a round. What isn't settled
-    goes on from its mean, but at the height from which it started: the motion of a ball on the wall
-    alone does not depend on its height, and one that sinks must not land."""
+    Of an engine as it comes every state counts, for what it is after a round. After a part of a
+    round the limit is that part of it; what isn't settled goes on as it is, or from its mean if it
+    but swings, or the round was whole. On the wall alone it does so at the height from which it
+    started: the motion there does not depend on its height, and a ball that sinks must not land."""
     rounds = criteria.rounds or runner.sampling.settling_rounds
     span, loose = criteria.span, criteria.loose
     left = [[*(SHORT if start.p.drag != STOKES else ()), *rounds] for start in starts]
     if runner.engine.relative_tolerance:
-        loose, left = math.inf, [[rounds[0]] for _ in starts]
+        loose, left = math.inf, [[AS_IT_COMES] for _ in starts]
     states: dict[int, SteadyState] = {}
     todo = dict(enumerate(starts))
     while todo:
@@ -105,7 +111,9 @@ def settle(
             step, t_end = coarse_step(start.p), duration(start.p, span * left[n].pop(0))
             samples = round(t_end / (STEPS_A_SAMPLE * step))
             step /= criteria.divisor
-            tasks.append(runner.task(start.p, start.x0, t_end, step, samples=samples))
+            task = runner.task(start.p, start.x0, t_end, step, samples=samples)
+            # goes on as deep as it was
+            tasks.append(replace(task, x0=start.x0) if n in states else task)
         under_way, todo = list(todo), {}
         for n, task, run in zip(under_way, tasks, runner.each(tasks), strict=True):
             start = starts[n]
@@ -116,10 +124,8 @@ def settle(
             state = states[n] = judge_run(start, task, run, loose)
             part = task.t_end / duration(start.p, span)
             if left[n] and state.excess > min(part, 1.0) * min(loose, criteria.sharp):
-                # A part of a round may end on the way to where the ball settles: it goes on as it
-                # is.
-                x = State.of(run.x[-1] if part < 1 else state.mean)
-                if part >= 1 and state.case.A is Contact.N:
+                x = State.of(state.mean if part >= 1 or state.swings else run.x[-1])
+                if state.case.A is Contact.N:
                     x = x._replace(y=max(State.of(start.x0).y, 0.0))
                 todo[n] = replace(start, x0=x.stacked())
     return [states[n] for n in range(len(starts))]
@@ -178,7 +184,8 @@ def _judge_window(
     elif max(excess, solving) > loose:
         way = "drifts" if max(drifting, solving) > loose else "swings"
         failure = f"{case.name} still {way}, {max(excess, solving):.2g} times the limit"
-    return SteadyState(start, case, values, means[len(series) :], task, excess, failure)
+    swinging = excess < math.inf and swings > SWINGS * max(worst.values())
+    return SteadyState(start, case, values, means[len(series) :], task, excess, failure, swinging)
 
 
 def _determined(case: Case) -> list[list[str]]:
