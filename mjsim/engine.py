@@ -95,7 +95,7 @@ class Run:
         self._timestep = self._settings.timestep
         given = p, self._x0, t_end, self._flow, self._settings, sample_interval
         self._interval, self._count = check_run(*given)
-        self._model, mjcf = scene.build(p, self._settings)
+        _, mjcf = scene.compiled(p, self._settings)
         shown = dataclasses.asdict(self._settings) | {
             "t_end": float(t_end), "sample_interval": self._interval * self._timestep,
             "x0": list(self._x0), "theta_0": self._theta_0, "event_times": EVENT_TIMES,
@@ -115,10 +115,10 @@ class Run:
         return self._classifier.events(self._end)
 
     def __iter__(self) -> Iterator[npt.NDArray[np.void]]:
-        from mjsim.stepping import JointedBall  # here, because the law takes long to load, compiled
+        from mjsim import stepping  # here, because the law takes long to load, compiled
 
-        given = self._model, self._p, self._settings, self._x0, self._theta_0
-        self.ball = ball = JointedBall(*given)
+        ball = stepping.ball_of(self._p, self._settings)
+        ball.start(self._x0, self._theta_0)
         step, steps = 0, (self._count - 1) * self._interval + 1  # none after the last sample
         noted, waiting = np.empty((NOTED, recorder.COLUMNS)), np.empty((0, recorder.COLUMNS))
         while step < steps and not self.header.failure:
@@ -131,22 +131,23 @@ class Run:
             first = -(-step // self._interval) - len(waiting)
             told = -(-self._classifier.decided // self._interval) - first
             raw, waiting = waiting[:told], waiting[told:]
-            yield self._finish(first, raw)
+            yield self._finish(first, raw, ball.lead)
+        if not self.header.failure:
+            stepping.give_back(ball, self._settings)
 
     def trajectory(self) -> Trajectory:
         """The whole run, carried out to its end."""
         blocks = list(self)
-        del self.ball  # of many runs the engines would take gigabytes
         return Trajectory.from_blocks(self.header, blocks, self.events)
 
-    def _finish(self, first: int, raw: Array) -> npt.NDArray[np.void]:
+    def _finish(self, first: int, raw: Array, lead: float) -> npt.NDArray[np.void]:
         """Turn raw samples (n, columns) into a block, up to where the run diverges or the ball
         breaks through."""
         p, samples = self._p, np.arange(first, first + len(raw))
         time = samples.astype(float) * (self._interval * self._timestep)
         sound = (np.abs(raw) < recorder.HUGE).all(axis=1) & (raw[:, 1:3] > -p.r).all(axis=1)
         count = len(raw) if sound.all() else int(sound.argmin())
-        block = recorder.samples(time[:count], raw[:count], self.ball.lead, p)
+        block = recorder.samples(time[:count], raw[:count], lead, p)
         block["case"] = self._classifier.cases(samples[:count] * self._interval)
         if count < len(raw):
             self._end = end = float(time[count])

@@ -66,14 +66,18 @@ def build(p: Parameters, settings: ContactModel) -> tuple[Any, str]:
 
     Raises `InputError` if MuJoCo refuses the parameters.
     """
-    # the fluid is no part of a scene
-    model, text = _compiled(p.replace(omega_0=0.0), settings)
+    model, text = compiled(p, settings)
     return copy.copy(model), text
+
+
+def compiled(p: Parameters, settings: ContactModel) -> tuple[Any, str]:
+    """As `build`, but the model is shared."""
+    return _compiled(p.replace(omega_0=0.0), settings)  # the fluid is no part of a scene
 
 
 @functools.lru_cache(maxsize=256)
 def _compiled(p: Parameters, settings: ContactModel) -> tuple[Any, str]:
-    """`build` from a cache; the model is shared."""
+    """`compiled` from a cache."""
     filled = spec(p, settings)
     try:
         for texture in list(filled.textures):

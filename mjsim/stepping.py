@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from mjsim import recorder
+from mjsim import recorder, scene
 from mjsim.contact_settings import LANDING_PARTS, ContactModel, RigidContacts
 from mjsim.coulomb import Coulomb
 from mjsim.coulomb.compiling import entry
@@ -190,29 +190,42 @@ def advance(body: Joints, fluid: Array, rows: Array) -> None:
             change_step(body, short, body.step)
 
 
+_MOST_BALLS = 64
+"""Balls that are kept for later runs, at most: it takes a millisecond to make one."""
+BALLS: dict[tuple[Parameters, ContactModel], JointedBall] = {}
+"""Balls whose runs are over, by what they were made of, the latest last."""
+
+
+def ball_of(p: Parameters, settings: ContactModel) -> JointedBall:
+    """A ball with these parameters that no other run has; omega_0 makes no difference."""
+    alike = p.replace(omega_0=0.0), settings
+    return BALLS.pop(alike, None) or JointedBall(scene.build(*alike)[0], *alike)
+
+
+def give_back(ball: JointedBall, settings: ContactModel) -> None:
+    """Keep a ball whose run is over."""
+    BALLS[ball.p, settings] = ball
+    for oldest in list(BALLS)[:-_MOST_BALLS]:
+        BALLS.pop(oldest, None)  # another thread may have it
+
+
 class JointedBall:
-    """A ball on joints, with an engine of its own.
+    """A ball on joints, with an engine of its own. It has to `start`.
 
     Parameters
     ----------
     model : of its own, since its wall moves
-    x : state at the start; omega_0 is that of the steps
-    theta_0 : azimuth at the start, rad
+    p : omega_0 is that of the steps
     """
 
-    def __init__(
-        self, model: Any, p: Parameters, settings: ContactModel, x: State, theta_0: float
-    ) -> None:
-        self.model, self.data = model, mujoco.MjData(model)
-        self.law = None
+    def __init__(self, model: Any, p: Parameters, settings: ContactModel) -> None:
+        self.model, self.data, self.p = model, mujoco.MjData(model), p
+        data, self.law = self.data, None
         if isinstance(settings, RigidContacts):
             self.law = Coulomb(model, rigid=True, depth=0.0, share=SHARE)
             model.pair_margin[:] = p.g * settings.timestep**2
         self.lead = settings.midpoint * settings.timestep
         """How far places are ahead of velocities, s."""
-        place, v = recorder.joint_state(x, theta_0, p)
-        data = self.data
-        data.qpos[:3], data.qvel[:] = place + self.lead * v[:3], v
         self.body = Joints(
             qpos=data.qpos,
             qvel=data.qvel,
@@ -220,7 +233,7 @@ class JointedBall:
             sensors=data.sensordata,
             tangent=data.mocap_quat[0],
             margins=model.pair_margin,
-            last=np.array(v, float),
+            last=np.zeros(6),
             slips=np.zeros((2, 2)),
             landed=np.zeros(1, int),
             g=p.g,
@@ -230,6 +243,16 @@ class JointedBall:
             model=model._address,
             data=data._address,
         )
+
+    def start(self, x: State, theta_0: float) -> None:
+        """Begin a run with a state, at an azimuth in rad; nothing is left of an earlier one."""
+        mujoco.mj_resetData(self.model, self.data)
+        if self.law:
+            self.law.reset()
+        place, v = recorder.joint_state(x, theta_0, self.p)
+        body = self.body
+        body.qpos[:3], body.qvel[:], body.last[:] = place + self.lead * v[:3], v, v
+        body.slips[:], body.landed[:] = 0.0, 0
 
     def acting(self) -> AbstractContextManager[None]:
         """Within this the engine's own steps obey the law, if there is one."""

@@ -215,7 +215,8 @@ def cost(runs: int, steps: int = 2500) -> list[float]:
     settings, p = ContactSettings(), SLIPPING
     (state,) = stable_solutions(p)
     model, _ = scene.build(p, settings)
-    settled = JointedBall(model, p, settings, State.one(state.x), 0.0)
+    settled = JointedBall(model, p, settings)
+    settled.start(State.one(state.x), 0.0)
     settled.advance(np.full(500, p.omega_0), np.empty((500, COLUMNS)))
     start = p, state.x, steps * settings.timestep, None, settings
     bare, whole = [_bare(settled, runs, steps)], []
