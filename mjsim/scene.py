@@ -18,6 +18,11 @@ IMPRATIO = 300
 forces of balls that roll at both points were too rough for the onset of lifting, and it hung on
 round-off.)"""
 
+LS_TOLERANCE = 1e4
+"""Of rigid contacts, in units of the solver's tolerance, 1e-20: a line search ends at round-off. It
+went on to its last iteration where the ball rolls on the wall alone, for a third of the time of a
+step."""
+
 
 def spec(p: Parameters, settings: ContactModel) -> Any:
     """The scene as an `mujoco.MjSpec`."""
@@ -41,7 +46,7 @@ def spec(p: Parameters, settings: ContactModel) -> Any:
     if isinstance(settings, ContactSettings):
         _set_contacts(spec, settings)
     else:  # the law takes none of these
-        option.impratio = IMPRATIO
+        option.impratio, option.ls_tolerance = IMPRATIO, LS_TOLERANCE
     return spec
 
 
