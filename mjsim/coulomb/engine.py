@@ -80,7 +80,8 @@ MJ_OPTION = _only(structure("mjOption"), "timestep", "gravity", "cone", "solver"
 MJ_MODEL = _only(
     structure("mjModel"),
     *("nv", "nbody", "njnt", "ngeom", "geom_rbound", "geom_bodyid"),
-    *("geom_aabb", "body_rootid", "body_mocapid"),
+    *("geom_type", "geom_aabb", "geom_dataid", "body_rootid", "body_weldid", "body_mocapid"),
+    *("nhfield", "hfield_size", "hfield_nrow", "hfield_ncol", "hfield_adr", "hfield_data"),
     *("nu", "jnt_type", "jnt_dofadr"),
     *("nC", "nD", "dof_parentid", "M_rownnz", "M_rowadr", "M_colind", "mapD2M"),
     opt=MJ_OPTION,
@@ -125,8 +126,8 @@ def array_at(item: Any) -> Any:
 
 
 models, datas, engine_contacts = array_at(MJ_MODEL), array_at(MJ_DATA), array_at(MJ_CONTACT)
-reals, integers = array_at(types.float64), array_at(types.int32)
-words = array_at(types.int64)
+reals, singles = array_at(types.float64), array_at(types.float32)
+integers, words = array_at(types.int32), array_at(types.int64)
 
 
 # -- functions -------------------------------------------------------------------------------------
@@ -184,7 +185,9 @@ def _differs(there: Any, owner: Any) -> bool:
 def _check() -> None:
     """Raise `ImportError` unless a small model lies in memory as `mujoco.introspect` says."""
     model = mujoco.MjModel.from_xml_string(
-        '<mujoco><option timestep="0.0078125" gravity="0 0 -7"/><worldbody>'
+        '<mujoco><option timestep="0.0078125" gravity="0 0 -7"/>'
+        '<asset><hfield name="hill" nrow="2" ncol="3" size="1 1 1 1"/></asset>'
+        '<worldbody><geom type="hfield" hfield="hill" pos="9 9 0"/>'
         '<geom type="plane" size="1 1 1"/><body pos="0 0 .09"><freejoint/>'
         '<geom size=".1" condim="4" friction=".7 .03 .01"/></body></worldbody></mujoco>'
     )

@@ -120,10 +120,7 @@ def find_residual(model: Any, data: Any, memory: Any, a: Any) -> float:
             residual[other] += inertia[n] * a[k]
         residual[k] += inertia[starts[i] + lengths[i] - 1] * a[k]
     for u in units_of(memory):
-        if rows[u].dim == 3:  # loops of a length that is known are faster
-            subtract_forces(memory, rows, u, 3, a, residual)
-        else:
-            subtract_forces(memory, rows, u, rows[u].dim, a, residual)
+        subtract_forces(memory, rows, u, a, residual)
     for k in range(memory.size):
         i = dofs[k].dof
         square += residual[k] ** 2 / inertia[starts[i] + lengths[i] - 1]
@@ -131,11 +128,11 @@ def find_residual(model: Any, data: Any, memory: Any, a: Any) -> float:
 
 
 @kernel
-def subtract_forces(memory: Any, rows: Any, u: int, dim: int, a: Any, residual: Any) -> None:
+def subtract_forces(memory: Any, rows: Any, u: int, a: Any, residual: Any) -> None:
     """Find the forces of a unit at accelerations `a`, and take J' f off the residual."""
     unit, place, jacobian = rows[u], places_of(memory, rows[u]), jacobians_of(memory, rows[u])
-    force = reals(memory.local_at, dim)
-    for r in range(dim):
+    force = reals(memory.local_at, unit.dim)
+    for r in range(unit.dim):
         row, acceleration = rows[u + r], 0.0
         for n in range(len(place)):
             acceleration += jacobian[r, n] * a[place[n]]
@@ -149,11 +146,11 @@ def subtract_forces(memory: Any, rows: Any, u: int, dim: int, a: Any, residual: 
         contact.state = contact_forces(rows, contact)
     if unit.force == 0:
         return
-    for r in range(dim):
+    for r in range(unit.dim):
         force[r] = rows[u + r].force
     for n in range(len(place)):
         whole = 0.0
-        for r in range(dim):
+        for r in range(unit.dim):
             whole += jacobian[r, n] * force[r]
         residual[np.uint64(place[n])] -= whole
 
@@ -175,7 +172,7 @@ def assemble(model: Any, data: Any, memory: Any, matrix: Any) -> None:
     for u in units_of(memory):
         if rows[u].force != 0:
             find_stiffness(rows, contacts, u)
-            if rows[u].dim == 3:  # as above
+            if rows[u].dim == 3:  # loops of a length that is known are faster
                 add_unit(memory, rows, u, 3, matrix)
             else:
                 add_unit(memory, rows, u, rows[u].dim, matrix)

@@ -1,5 +1,5 @@
 """Patches of contact: points of flat faces that a collider drops by turns are put back; those that
-it adds, and the inner edges of a floor in pieces, are left out."""
+it adds are left out."""
 
 from __future__ import annotations
 
@@ -7,10 +7,9 @@ import math
 from typing import Any
 
 from .compiling import kernel
-from .contacts import SIZE, WORDS, copy, cosine, leave_out, same_geoms, smaller_radius
+from .contacts import SIZE, WORDS, copy, leave_out, same_geoms
 from .engine import (
     engine_contacts,
-    integers,
     mj_addContact,
     mj_fwdVelocity,
     mj_island,
@@ -19,7 +18,7 @@ from .engine import (
     reals,
 )
 from .memory import NEW, contacts_at, contacts_of
-from .parameters import ALIGNED, AT_MOST, CORNER, EDGE, UNMOVED
+from .parameters import AT_MOST, CORNER, UNMOVED
 
 
 @kernel
@@ -70,56 +69,6 @@ def leave_added_points_out(model: Any, data: Any, memory: Any) -> bool:
             leave_out(data, found[new.index])
             left_out = True
     return left_out
-
-
-@kernel
-def leave_inner_edges_out(model: Any, data: Any, memory: Any) -> bool:
-    """Leave out edges between pieces of a floor, at which what slides from one to the next would
-    stop: contacts about to close, with geoms below one that bears something.
-
-    Returns whether there were any.
-    """
-    contacts, found = contacts_of(memory), engine_contacts(data.contact, data.ncon)
-    velocity, h, left_out = reals(data.efc_vel, data.nefc), model.opt.timestep, False
-    for i in range(memory.contacts):
-        edge, inner = contacts[i], False
-        closing = max(-velocity[edge.address], 0.0) + h * memory.gravity
-        closes = edge.load == 0 and edge.gap < AT_MOST * h * closing
-        for k in range(memory.contacts if closes else 0):
-            if contacts[k].load > 0 and not inner:
-                inner = lies_below(model, data, edge, contacts[k])
-        if inner:
-            leave_out(data, found[edge.index])
-            left_out = True
-    return left_out
-
-
-@kernel
-def lies_below(model: Any, data: Any, edge: Any, floor: Any) -> bool:
-    """Whether what a moving geom touches lies, with its bounding box, below another contact of the
-    geom, which has another normal. Geoms are convex: all of this one lies above."""
-    if abs(cosine(edge, floor)) >= 1 - ALIGNED:
-        return False
-    bodies, below = integers(model.geom_bodyid, model.ngeom), False
-    boxes = reals(model.geom_aabb, (model.ngeom, 6))
-    xpos = reals(data.geom_xpos, (model.ngeom, 3))
-    xmat = reals(data.geom_xmat, (model.ngeom, 3, 3))
-    for side in range(2):
-        moving, piece, top = edge.geoms[side], edge.geoms[1 - side], 0.0
-        if bodies[moving] == 0 or (moving != floor.geoms[0] and moving != floor.geoms[1]):
-            continue
-        up = 1.0 if moving == floor.geoms[1] else -1.0
-        for j in range(3):
-            top += up * floor.frame[0, j] * (xpos[piece, j] - floor.pos[j])
-        for axis in range(3):
-            along = 0.0
-            for j in range(3):
-                along += up * floor.frame[0, j] * xmat[piece, j, axis]
-            top += along * boxes[piece, axis] + abs(along) * boxes[piece, 3 + axis]
-        if top > EDGE * smaller_radius(model, edge.geoms):
-            return False
-        below = True
-    return below
 
 
 @kernel

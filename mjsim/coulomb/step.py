@@ -7,6 +7,7 @@ from typing import Any
 
 from .compiling import kernel
 from .contacts import copy_jacobians, find, match, nothing_moved, read_gaps, remember_forces
+from .edges import leave_inner_edges_out
 from .engine import (
     WARNINGS,
     datas,
@@ -28,7 +29,7 @@ from .friction import (
 from .memory import CONTACT_ROW, DRY, contacts_of, memories, rows_of
 from .newton import solve_contacts
 from .parameters import EARTH, NEXT, OVER, SOFTER
-from .patches import leave_added_points_out, leave_inner_edges_out, put_points_back
+from .patches import leave_added_points_out, put_points_back
 from .rigid import (
     add_dampers,
     oppose_slip_at_mid_step,
@@ -107,7 +108,7 @@ def update_contacts(
     if anew or leave_added_points_out(model, data, memory):
         find(model, data, memory)
         match(model, data, memory)
-    if memory.law.rigid and leave_inner_edges_out(model, data, memory):
+    if leave_inner_edges_out(model, data, memory):
         find(model, data, memory)
         match(model, data, memory)
     copy_jacobians(model, data, memory)

@@ -183,6 +183,32 @@ def test_what_slides_over_the_seams_of_a_floor_stops_only_at_a_wall():
     assert data.qpos[0] == pytest.approx(0.65, abs=1e-4)
 
 
+@WAYS
+@pytest.mark.parametrize("geom", [BOX, 'type="cylinder" size=".08 .03"'])
+@pytest.mark.parametrize("rise", [0.0, 0.1])
+def test_what_slides_over_a_heightfield_stops_at_no_edge_of_its_cells(rigid, geom, rise):
+    """Flat, or a slope that rises by `rise`."""
+    heights = " ".join(f"{x / 16}" for _ in range(9) for x in range(17))
+    hill = (
+        f'<hfield name="hill" nrow="9" ncol="17" size="1 .5 {2 * rise} .1" elevation="{heights}"/>'
+    )
+    if rise == 0:
+        hill = '<hfield name="hill" nrow="9" ncol="17" size="1 .5 .1 .1"/>'
+    angle, mu = math.atan(rise), 0.2
+    bodies = '<geom type="hfield" hfield="hill"/>' + free(
+        "body", f"-.7 .03 {0.3 * rise + 0.06}", geom
+    )
+    made = model(bodies, more=f"<asset>{hill}</asset>", mu=mu)
+    data, law = mujoco.MjData(made), Coulomb(made, rigid=rigid)
+    law.step(data, 500)
+    begin, speed = data.qpos[:3].copy(), 1.5
+    data.qvel[:] = 0
+    data.qvel[0], data.qvel[2] = speed * math.cos(angle), speed * math.sin(angle)
+    law.step(data, 500)
+    way = speed**2 / (2 * G * (mu * math.cos(angle) + math.sin(angle)))
+    assert np.linalg.norm(data.qpos[:3] - begin) == pytest.approx(way, rel=0.02)
+
+
 def test_what_hangs_below_the_floor_on_which_a_body_slides_stops_at_a_wall():
     """The wall lies below the contacts that bear the body, but not all of the body lies above."""
     high = '<geom type="box" size="2 .3 .1" pos="0 0 .8"/>'

@@ -1,0 +1,137 @@
+"""Inner edges of floors in pieces, and of heightfields: at these what slides from one piece to the
+next, or one cell, would stop. Contacts with them are left out.
+
+A convex geom lies above all of a contact that it has. What reaches no higher than this contact, the
+geom can't run against: a contact with it that has another normal is one of an inner edge. A
+heightfield has no normal that is steeper than its cells around.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import mujoco
+
+from .compiling import kernel
+from .contacts import cosine, leave_out, same_geoms, smaller_radius
+from .engine import engine_contacts, integers, reals, singles
+from .memory import contacts_of
+from .parameters import ALIGNED, AT_MOST, EDGE
+
+HEIGHTFIELD = int(mujoco.mjtGeom.mjGEOM_HFIELD)
+
+
+@kernel
+def leave_inner_edges_out(model: Any, data: Any, memory: Any) -> bool:
+    """Leave out contacts with inner edges of what is at rest.
+
+    Returns whether there were any.
+    """
+    contacts, found = contacts_of(memory), engine_contacts(data.contact, data.ncon)
+    types, left_out = integers(model.geom_type, model.ngeom), False
+    on_floor, count = integers(memory.floor_at, memory.contacts), 0
+    for i in range(memory.contacts):
+        if piece_of(model, contacts[i]) >= 0:
+            on_floor[count], count = i, count + 1
+    for i in on_floor[:count]:
+        edge, others = contacts[i], 0
+        on_hill = types[edge.geoms[piece_of(model, edge)]] == HEIGHTFIELD
+        looks = is_steeper(model, data, edge) if on_hill else closes(model, data, memory, edge)
+        for k in on_floor[: count * looks]:
+            floor = contacts[k]
+            if found[floor.index].exclude:
+                continue
+            if on_hill:
+                others += same_geoms(edge.geoms, floor.geoms) and not is_steeper(model, data, floor)
+            elif floor.load > 0 or floor.gap <= 0:
+                others += lies_below(model, data, edge, floor)
+        if others > on_hill:  # on one point of a hill alone what isn't round would fall over
+            leave_out(data, found[edge.index])
+            left_out = True
+    return left_out
+
+
+@kernel
+def closes(model: Any, data: Any, memory: Any, edge: Any) -> bool:
+    """Whether a contact is about to close, or a soft one is closed. What bears a rigid body is no
+    inner edge."""
+    h, velocity = model.opt.timestep, reals(data.efc_vel, data.nefc)
+    closing = max(-velocity[edge.address], 0.0) + h * memory.gravity
+    holds = memory.law.rigid and edge.load > 0
+    return bool(not holds and edge.gap < AT_MOST * h * closing)
+
+
+@kernel
+def piece_of(model: Any, contact: Any) -> int:
+    """Which of two geoms in contact is at rest, if one is and the other isn't; else -1."""
+    bodies = integers(model.geom_bodyid, model.ngeom)
+    welded, piece = integers(model.body_weldid, model.nbody), -1
+    for side in range(2):
+        if welded[bodies[contact.geoms[side]]] == 0 and welded[bodies[contact.geoms[1 - side]]]:
+            piece = side
+    return piece
+
+
+@kernel
+def lies_below(model: Any, data: Any, edge: Any, floor: Any) -> bool:
+    """Whether the piece to which an edge belongs lies below another contact of the same moving
+    geom, with another normal."""
+    side, other = piece_of(model, edge), piece_of(model, floor)
+    if edge.geoms[1 - side] != floor.geoms[1 - other] or abs(cosine(edge, floor)) >= 1 - ALIGNED:
+        return False
+    up = 1.0 if other == 0 else -1.0  # normals point from the first geom to the second
+    height = height_above(model, data, edge.geoms[side], floor, up)
+    return bool(height <= EDGE * smaller_radius(model, edge.geoms) + max(-floor.gap, 0.0))
+
+
+@kernel
+def height_above(model: Any, data: Any, piece: int, floor: Any, up: float) -> float:
+    """How far a piece, with its bounding box, reaches beyond a contact, along its normal times
+    `up`, m."""
+    place = reals(data.geom_xpos, (model.ngeom, 3))[piece]
+    axes = reals(data.geom_xmat, (model.ngeom, 3, 3))[piece]
+    box, height = reals(model.geom_aabb, (model.ngeom, 6))[piece], 0.0
+    for axis in range(3):
+        along = 0.0
+        for j in range(3):
+            along += up * floor.frame[0, j] * axes[j, axis]
+        height += up * floor.frame[0, axis] * (place[axis] - floor.pos[axis])
+        height += along * box[axis] + abs(along) * box[3 + axis]
+    return height
+
+
+@kernel
+def is_steeper(model: Any, data: Any, edge: Any) -> bool:
+    """Whether a contact with a heightfield is steeper than all cells around; not at its border."""
+    piece, x, y, up = edge.geoms[piece_of(model, edge)], 0.0, 0.0, 0.0
+    place = reals(data.geom_xpos, (model.ngeom, 3))[piece]
+    axes = reals(data.geom_xmat, (model.ngeom, 3, 3))[piece]
+    for j in range(3):
+        way = edge.pos[j] - place[j]
+        x, y, up = x + axes[j, 0] * way, y + axes[j, 1] * way, up + axes[j, 2] * edge.frame[0, j]
+    slope = steepest_slope(model, integers(model.geom_dataid, model.ngeom)[piece], x, y)
+    return bool(abs(up) < 1 / math.sqrt(1 + slope**2) - ALIGNED)
+
+
+@kernel
+def steepest_slope(model: Any, field: int, x: float, y: float) -> float:
+    """The largest slope of the four cells of a heightfield about its point next to x, y; infinite
+    at its border."""
+    rows = integers(model.hfield_nrow, model.nhfield)[field]
+    columns = integers(model.hfield_ncol, model.nhfield)[field]
+    size = reals(model.hfield_size, (model.nhfield, 4))[field]
+    first = integers(model.hfield_adr, model.nhfield)[field]
+    heights = singles(model.hfield_data + 4 * first, (rows, columns))
+    wide, long = 2 * size[0] / (columns - 1), 2 * size[1] / (rows - 1)
+    row, column = round((y + size[1]) / long), round((x + size[0]) / wide)
+    if not (0 < row < rows - 1 and 0 < column < columns - 1):
+        return math.inf
+    along, across = 0.0, 0.0
+    for i in range(row - 1, row + 2):
+        for k in range(column - 1, column + 2):
+            if k > column - 1:
+                along = max(along, abs(heights[i, k] - heights[i, k - 1]) / wide)
+            if i > row - 1:
+                across = max(across, abs(heights[i, k] - heights[i - 1, k]) / long)
+    return float(size[2] * math.sqrt(along**2 + across**2))
