@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .callback import CALLBACK, finish
+from .engine import MARGINS_ADD_UP
 from .memory import Simulation, check_state, sizes
 from .parameters import CCD_TOLERANCE, EARTH, Law
 
@@ -471,7 +472,11 @@ def _see_ahead(model: Any) -> None:
     gravity, h = float(np.linalg.norm(model.opt.gravity)) or EARTH, model.opt.timestep
     ahead = gravity * h**2 if _sticks(model) else h * math.sqrt(2 * gravity * model.stat.extent)
     most = model.geom_rbound / 5
-    np.maximum(model.geom_margin, np.minimum(ahead, most), out=model.geom_margin)
+    own = np.minimum(ahead, most)
+    if MARGINS_ADD_UP:  # each of two geoms has its half, what is at rest that of the smallest body
+        moves = model.body_weldid[model.geom_bodyid] > 0
+        own = np.where(moves, own, own.min(where=moves & (most > 0), initial=ahead)) / 2
+    np.maximum(model.geom_margin, own, out=model.geom_margin)
     pairs = [model.pair_geom1, model.pair_geom2]
     np.maximum(
         model.pair_margin,

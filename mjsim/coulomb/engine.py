@@ -182,14 +182,16 @@ def _differs(there: Any, owner: Any) -> bool:
     return False
 
 
-def _check() -> None:
-    """Raise `ImportError` unless a small model lies in memory as `mujoco.introspect` says."""
+def _check() -> bool:
+    """Raise `ImportError` unless a small model lies in memory as `mujoco.introspect` says; whether
+    the margins of two geoms add up there."""
     model = mujoco.MjModel.from_xml_string(
         '<mujoco><option timestep="0.0078125" gravity="0 0 -7"/>'
         '<asset><hfield name="hill" nrow="2" ncol="3" size="1 1 1 1"/></asset>'
         '<worldbody><geom type="hfield" hfield="hill" pos="9 9 0"/>'
-        '<geom type="plane" size="1 1 1"/><body pos="0 0 .09"><freejoint/>'
-        '<geom size=".1" condim="4" friction=".7 .03 .01"/></body></worldbody></mujoco>'
+        '<geom type="plane" size="1 1 1" margin=".01"/><body pos="0 0 .09"><freejoint/>'
+        '<geom size=".1" margin=".01" condim="4" friction=".7 .03 .01"/></body>'
+        "</worldbody></mujoco>"
     )
     data = mujoco.MjData(model)
     data.time = 3.0
@@ -202,6 +204,8 @@ def _check() -> None:
     ):
         version = mujoco.__version__
         raise ImportError(f"MuJoCo {version} doesn't lie in memory as its mujoco.introspect says")
+    return bool(data.contact.includemargin[0] > 0.015)
 
 
-_check()
+MARGINS_ADD_UP = _check()
+"""Whether a pair of geoms has the sum of their margins, as since MuJoCo 4, or the larger one."""
