@@ -98,7 +98,8 @@ class Classifier:
         stop = max(first, len(shown) - (0 if last else PERSISTENCE - 1))
         if stop > first:
             states = self._lasting(shown[first:])[: stop - first + 1]
-            for k in np.flatnonzero((states[1:] != states[:-1]).any(axis=1)).tolist():
+            changes = states[1:] != states[:-1]
+            for k in np.flatnonzero(changes[:, 0] | changes[:, 1]).tolist():
                 self._note(self.decided + k, steps[:-1, : first + k + 1], states[k], states[k + 1])
         self.decided += stop - first
         self._waiting, self._latest = len(shown) - stop, steps[:, max(0, stop - _BACK) :].copy()
@@ -124,11 +125,12 @@ class Classifier:
     def _lasting(self, shown: Array) -> Array:
         """The states of the contacts that last, (steps + 1, 2): before these steps, and in each of
         them."""
+        more = min(PERSISTENCE, len(shown)) - 1
+        seen = len(shown) - more
         lasts = np.zeros(shown.shape, dtype=bool)
-        alike = np.lib.stride_tricks.sliding_window_view(
-            shown, min(PERSISTENCE, len(shown)), axis=0
-        )
-        lasts[: len(alike)] = (alike == alike[..., :1]).all(axis=-1)
+        lasts[:seen] = True
+        for k in range(1, more + 1):
+            lasts[:seen] &= shown[k : k + seen] == shown[:seen]
         if not self._changes:  # the first that lasts, or the first of all
             begin = _case_number(shown[lasts.argmax(axis=0), [0, 1]])
             self._changes.append((0, 0.0, begin, begin))

@@ -95,7 +95,8 @@ class Run:
         self._timestep = self._settings.timestep
         given = p, self._x0, t_end, self._flow, self._settings, sample_interval
         self._interval, self._count = check_run(*given)
-        _, mjcf = scene.compiled(p, self._settings)
+        self._at_rest = p.replace(omega_0=0.0)  # whatever flows, the engine is the same
+        _, mjcf = scene.compiled(self._at_rest, self._settings)
         shown = dataclasses.asdict(self._settings) | {
             "t_end": float(t_end), "sample_interval": self._interval * self._timestep,
             "x0": list(self._x0), "theta_0": self._theta_0, "event_times": EVENT_TIMES,
@@ -117,7 +118,7 @@ class Run:
     def __iter__(self) -> Iterator[npt.NDArray[np.void]]:
         from mjsim import stepping  # here, because the law takes long to load, compiled
 
-        ball = stepping.ball_of(self._p, self._settings)
+        ball = stepping.ball_of(self._at_rest, self._settings)
         ball.start(self._x0, self._theta_0)
         step, steps = 0, (self._count - 1) * self._interval + 1  # none after the last sample
         noted, waiting = np.empty((NOTED, recorder.COLUMNS)), np.empty((0, recorder.COLUMNS))

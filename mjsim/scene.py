@@ -71,18 +71,14 @@ def build(p: Parameters, settings: ContactModel) -> tuple[Any, str]:
 
     Raises `InputError` if MuJoCo refuses the parameters.
     """
-    model, text = compiled(p, settings)
+    # the fluid is no part of a scene
+    model, text = compiled(p.replace(omega_0=0.0), settings)
     return copy.copy(model), text
 
 
-def compiled(p: Parameters, settings: ContactModel) -> tuple[Any, str]:
-    """As `build`, but the model is shared."""
-    return _compiled(p.replace(omega_0=0.0), settings)  # the fluid is no part of a scene
-
-
 @functools.lru_cache(maxsize=256)
-def _compiled(p: Parameters, settings: ContactModel) -> tuple[Any, str]:
-    """`compiled` from a cache."""
+def compiled(p: Parameters, settings: ContactModel) -> tuple[Any, str]:
+    """As `build`, but from a cache: the model is shared. It is one for all omega_0: give none."""
     filled = spec(p, settings)
     try:
         for texture in list(filled.textures):

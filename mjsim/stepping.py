@@ -197,9 +197,8 @@ BALLS: dict[tuple[Parameters, ContactModel], JointedBall] = {}
 
 
 def ball_of(p: Parameters, settings: ContactModel) -> JointedBall:
-    """A ball with these parameters that no other run has; omega_0 makes no difference."""
-    alike = p.replace(omega_0=0.0), settings
-    return BALLS.pop(alike, None) or JointedBall(scene.build(*alike)[0], *alike)
+    """A ball with these parameters that no other run has; omega_0 is 0."""
+    return BALLS.pop((p, settings), None) or JointedBall(scene.build(p, settings)[0], p, settings)
 
 
 def give_back(ball: JointedBall, settings: ContactModel) -> None:
