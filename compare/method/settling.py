@@ -16,7 +16,7 @@ from compare.method.quantities import quantity
 from compare.method.record import Measured, Measurement, Records
 from compare.method.runner import Runner, coarse_step
 from compare.method.scales import dragged_speed, rotation_scale
-from compare.method.statistics import COVERAGE, Estimate, estimate, steady_mean
+from compare.method.statistics import COVERAGE, Estimate, estimate, steady_limit, steady_mean
 from compare.method.step_pairs import Start
 from model import Case, Contact, Parameters, State, Trajectory
 from model.arrays import Array
@@ -32,9 +32,10 @@ SHORT = (1 / 64, 1 / 8)
 sooner. The drift limit of such a round is reduced in proportion to its length."""
 STARTED_NEAR = 1 / 4
 """The round before those where a ball begins from what it settled to with a longer step."""
-SWINGS = 100.0
-"""Swing divided by drift from which on a ball but swings about its mean. (Of what dies out without
-swinging it is about five.)"""
+NEARBY = 1e4
+"""Times the limit below which a run goes on from where its means lead: speeds then drift by some
+thousandths at most. What grows, as where a state is unstable, leads nowhere and is left as it is.
+A guess that is wrong costs time: what counts is how the run drifts that begins there."""
 AS_IT_COMES = 0.45  #: the one round of an engine as it comes
 STEPS_A_SAMPLE = 8
 """A coarse step is about a twentieth of sqrt(R/g), and the ball goes round more slowly."""
@@ -64,11 +65,11 @@ class SteadyState:
     case: Case
     values: Mapping[str, Estimate] = field(repr=False)
     mean: Array
-    """Its mean state, (8,), from which it goes on: without the oscillation that it still has."""
+    """The state to which its means lead, (8,), from which it goes on: without the oscillation and
+    the drift that it still has."""
     task: Task = field(repr=False)
     excess: float = math.inf  #: drift or swing divided by its limit for a comparison with theory
     failure: str = ""  #: why it doesn't count as settled
-    swings: bool = False  #: whether it swings about a mean that is all but at rest
 
     def settled_in(self, *cases: Case) -> bool:
         """Whether it counts as settled, in one of these cases."""
@@ -95,9 +96,10 @@ def settle(
     """Run the ball from each start until it is settled; the states, in order.
 
     Of an engine as it comes every state counts, for what it is after a round. After a part of a
-    round the limit is that part of it; what isn't settled goes on as it is, or from its mean if it
-    but swings, or the round was whole. On the wall alone it does so at the height from which it
-    started: the motion there does not depend on its height, and a ball that sinks must not land."""
+    round the limit is that part of it. What isn't settled goes on from where its means lead, or, if
+    it is far from there after a part of a round, as it is. On the wall alone it does so at the
+    height from which it started: the motion there does not depend on its height, and a ball that
+    sinks must not land."""
     rounds = criteria.rounds or runner.sampling.settling_rounds
     span, loose = criteria.span, criteria.loose
     left = [[*(SHORT if start.p.drag != STOKES else ()), *rounds] for start in starts]
@@ -124,7 +126,8 @@ def settle(
             state = states[n] = judge_run(start, task, run, loose)
             part = task.t_end / duration(start.p, span)
             if left[n] and state.excess > min(part, 1.0) * min(loose, criteria.sharp):
-                x = State.of(state.mean if part >= 1 or state.swings else run.x[-1])
+                near = part >= 1 or state.excess < NEARBY
+                x = State.of(state.mean if near else run.x[-1])
                 if state.case.A is Contact.N:
                     x = x._replace(y=max(State.of(start.x0).y, 0.0))
                 todo[n] = replace(start, x0=x.stacked())
@@ -164,8 +167,8 @@ def _judge_window(
     """The state by so many samples at the end of a run, of which these are series by quantity."""
     p, counts = start.p, np.bincount(run.case[-length:])
     case = Case(int(counts.argmax()))
-    means, drifts = steady_mean(np.stack([*series.values(), *run.x.T]), length)
-    mean, drift = (dict(zip(series, row.tolist(), strict=False)) for row in (means, drifts))
+    means, drifts = steady_mean(np.stack([*series.values()]), length)
+    mean, drift = (dict(zip(series, row.tolist(), strict=True)) for row in (means, drifts))
     sizes, solved = {q: quantity(q).size(p) for q in series}, SOLVED / (p.c * coarse_step(p))
     worst = {
         q: max(drift[each] / sizes[each] for each in group)
@@ -184,8 +187,8 @@ def _judge_window(
     elif max(excess, solving) > loose:
         way = "drifts" if max(drifting, solving) > loose else "swings"
         failure = f"{case.name} still {way}, {max(excess, solving):.2g} times the limit"
-    swinging = excess < math.inf and swings > SWINGS * max(worst.values())
-    return SteadyState(start, case, values, means[len(series) :], task, excess, failure, swinging)
+    leads = steady_limit(run.x.T, len(run.time) // 2)
+    return SteadyState(start, case, values, leads, task, excess, failure)
 
 
 def _determined(case: Case) -> list[list[str]]:

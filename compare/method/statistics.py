@@ -109,17 +109,30 @@ def steady_mean(values: Array, length: int, slowest: float = 0.0) -> tuple[Array
     From three windows, each a quarter of its length later than the one before: what is left of an
     approach by a constant ratio, plus the last change itself. Of a time constant of `slowest`
     samples the ratio is known to be no less, however little of the way is seen."""
-    weights = taper(length)
-    weights /= weights.sum()
-    n, shift = values.shape[1], length // 4
-    first, second, last = (
-        values[:, n - length - k * shift : n - k * shift] @ weights for k in (2, 1, 0)
-    )
+    first, second, last = _late_means(values, length)
     before, after = np.abs(second - first), np.abs(last - second)
     ratio = np.minimum(np.divide(after, before, out=np.zeros_like(after), where=before > 0), 0.9)
     if 0 < slowest < math.inf:
-        ratio = np.maximum(ratio, math.exp(-shift / slowest))
+        ratio = np.maximum(ratio, math.exp(-(length // 4) / slowest))
     return last, after / (1 - ratio)
+
+
+def steady_limit(values: Array, length: int) -> Array:
+    """Where rows (k, n) come to, (k,), if the means of `steady_mean` go on by the ratio at which
+    they approach (Aitken 1926); the last mean of what doesn't, or by more than `LARGEST_RATIO`."""
+    first, second, last = _late_means(values, length)
+    before, after = second - first, last - second
+    ratio = np.divide(after, before, out=np.zeros_like(after), where=before != 0)
+    ratio[(ratio < 0) | (ratio > LARGEST_RATIO)] = 0.0
+    return np.asarray(last + after * ratio / (1 - ratio))
+
+
+def _late_means(values: Array, length: int) -> list[Array]:
+    """Tapered means of rows (k, n) over three windows, the last one at the end."""
+    weights = taper(length)
+    weights /= weights.sum()
+    n, shift = values.shape[1], length // 4
+    return [values[:, n - length - k * shift : n - k * shift] @ weights for k in (2, 1, 0)]
 
 
 def tail(run: Trajectory, share: float = 0.1) -> slice:

@@ -29,6 +29,7 @@ from compare.method.statistics import (
     hops,
     propagator,
     propagator_error,
+    steady_limit,
     uniform,
     zero_and_slope,
 )
@@ -460,6 +461,16 @@ def test_what_swings_for_ever_settles_by_going_on_from_its_mean(runner, monkeypa
         runner, [settling.initial_condition("rough-floor", p, "on the wall")]
     )
     assert (state.case, state.failure) == (Case.NS, "")
+
+
+def test_what_dies_out_leads_to_its_limit_and_what_grows_nowhere():
+    """So a run that passes an unstable state leaves it, however near it comes in other ways."""
+    time = np.linspace(0, 10, 400)
+    dies, swings, grows = np.exp(-time), np.sin(9 * time), 1e-4 * np.exp(time / 2)
+    led = steady_limit(np.array([2 + dies, 2 + swings, 2 + grows, 2 + dies + grows]), 200)
+    np.testing.assert_allclose(led[0], 2, rtol=1e-9)
+    np.testing.assert_allclose(led[1], 2, rtol=1e-4)
+    assert np.all(led[2:] - 2 > grows[300])
 
 
 def outcome_of(claim, *rows):
