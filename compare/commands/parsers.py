@@ -57,7 +57,7 @@ def validate(parser: Parser) -> None:
     engines beside it refute is told, and changes nothing."""
     parser.set_defaults(level="default")
     level = parser.add_mutually_exclusive_group()
-    for name, time in (("quick", "three to six minutes"), ("full", "an hour or more")):
+    for name, time in (("quick", "two to four minutes"), ("full", "an hour or more")):
         takes = f"{time} (default: in between)"
         level.add_argument(f"--{name}", dest="level", action="store_const", const=name, help=takes)
     options.add_own_set(parser)
