@@ -13,7 +13,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from compare.bench.contact_law import Array, SoftContacts, geom_names, parameters
+from compare.bench.contact_law import Array, Moment, SoftContacts, geom_names, parameters
 from compare.bench.settled import Rest, Tell
 from mjsim import Coulomb
 from model.errors import few
@@ -107,10 +107,11 @@ class AtRest:
     data: Any
     settled: Rest
     contacts: SoftContacts
-    number: Array  # by which `data` has them
+    moments: Sequence[Moment]  # of the contacts, in their order
     radius: Array  # of the smaller body of each, m
     moves: Array
     found: Mapping[str, Array]
+    flexible: int  # contacts of flexible bodies, which are left out
     creep: float  # what passes for good, m/s
     depth: Array | float  # what passes for good, of each, m
 
@@ -142,15 +143,17 @@ def best_change(
     Also the harm that is left then. `pair` is the worst one, `members` are its contacts, `harm` is
     its own; `calm` says whether a changed model settles as well."""
     c, what, tried = scene.contacts, max(harm, key=lambda fault: harm[fault]), []
-    part = np.isin(np.arange(len(scene.number)), members)
+    part = np.isin(np.arange(len(scene.radius)), members)
     now = _worst(c, part, what)
     options = list(_options(c.subset(part))) if harm[what] > 1 else []
     for k, (option, value) in enumerate(options):
         tell(k / len(options))
-        other, state = copy.copy(scene.model), copy.copy(scene.data)
+        other = copy.copy(scene.model)
         apply(other, option, value)
-        mujoco.mj_fwdPosition(other, state)
-        changed = dataclasses.replace(c, **parameters(other, state, scene.number))
+        states = [Moment(copy.copy(each.data), each.number) for each in scene.moments]
+        for each in states:
+            mujoco.mj_fwdPosition(other, each.data)
+        changed = dataclasses.replace(c, **parameters(other, states))
         harms, then = scene.harm(changed), _worst(changed, part, what)
         left = max(float(each.max()) for each in harms.values())
         own = tuple(_changed_by_name(scene.model, other, option))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -221,6 +221,14 @@ class SoftContacts:
         chosen["rows"] = chosen["rows"] @ directions[sizes > 1e-9 * sizes.max(initial=0)].T
         return dataclasses.replace(self, **chosen)
 
+    @classmethod
+    def joined(cls, parts: Sequence[SoftContacts]) -> SoftContacts:
+        """Contacts of several moments as if they were of one."""
+        arrays = [f.name for f in dataclasses.fields(cls) if np.ndim(getattr(parts[0], f.name))]
+        values: dict[str, Any]
+        values = {name: np.concatenate([getattr(each, name) for each in parts]) for name in arrays}
+        return dataclasses.replace(parts[0], **values)
+
     def matrices(self) -> tuple[Array, Array, Array]:
         """Mass, damping and stiffness (n, n) of small motions: m a + d v + k x = 0."""
         law, flat = self.law(), self.rows.reshape(6 * len(self.dim), self.rows.shape[2])
@@ -266,8 +274,18 @@ class ContactResponse:
     damping: Array
 
 
-def contacts(model: Any, data: Any) -> tuple[SoftContacts, Array]:
-    """The contacts that carry more than a faint load at a state, and their numbers in `data`."""
+@dataclass(frozen=True)
+class Moment:
+    """A state, and those contacts of it that are looked at."""
+
+    data: Any
+    number: Array  # of each, by which `data` has them
+
+
+def contacts(
+    model: Any, data: Any, pairs: Collection[tuple[int, int]]
+) -> tuple[SoftContacts, Moment]:
+    """The contacts of these pairs of geoms that carry more than a faint load at a state."""
     # in it each row is a direction of a contact, whatever the cone and the integrator
     twin = copy.copy(model)
     twin.opt.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
@@ -279,7 +297,8 @@ def contacts(model: Any, data: Any) -> tuple[SoftContacts, Array]:
     mujoco.mj_forward(model, data)
     found, mass = data.contact, np.zeros((model.nv, model.nv))
     there = (state.contact.efc_address >= 0) & (found.exclude == 0)
-    number = np.flatnonzero(there & (found.geom >= 0).all(1))
+    among = np.array([pair in pairs for pair in map(tuple, found.geom.tolist())], bool)
+    number = np.flatnonzero(there & among)
     force = np.zeros((len(number), 6))
     for k, each in enumerate(number):
         mujoco.mj_contactForce(model, data, each, force[k])
@@ -300,6 +319,7 @@ def contacts(model: Any, data: Any) -> tuple[SoftContacts, Array]:
         jacobian = scipy.sparse.csr_array(sparse, (state.nefc, model.nv)).toarray()
         whitened = scipy.linalg.solve_triangular(np.linalg.cholesky(mass), jacobian.T, lower=True).T
         rows = whitened[row] * there[..., None]
+    moment = Moment(data, number)
     described = SoftContacts(
         inverse_mass=state.efc_diagA[first],
         margin=state.efc_margin[first],
@@ -308,22 +328,26 @@ def contacts(model: Any, data: Any) -> tuple[SoftContacts, Array]:
         rows=rows,
         geoms=found.geom[number],
         dim=dim,
-        **parameters(model, data, number),
+        **parameters(model, [moment]),
     )
-    return described, number
+    return described, moment
 
 
-def parameters(model: Any, data: Any, number: Array) -> dict[str, Any]:
+def parameters(model: Any, moments: Sequence[Moment]) -> dict[str, Any]:
     """What options of a model decide for these contacts, by the names in `SoftContacts`."""
     option, own = model.opt, ("solref", "solreffriction", "solimp", "friction")
-    return {
+    values = {
+        name: np.concatenate([getattr(each.data.contact, name)[each.number] for each in moments])
+        for name in own
+    }
+    return values | {
         "timestep": option.timestep,
         "impratio": option.impratio,
         "pyramidal": option.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL,
         "integrator": option.integrator,
         "noslip": option.noslip_iterations > 0,
         "refsafe": not option.disableflags & mujoco.mjtDisableBit.mjDSBL_REFSAFE,
-    } | {name: getattr(data.contact, name)[number] for name in own}
+    }
 
 
 def replacements(model: Any, c: SoftContacts, names: Sequence[str]) -> Iterator[tuple[str, str]]:

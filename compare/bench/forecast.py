@@ -2,7 +2,8 @@
 
 The engine says what the contacts of a settled model carry. From that `compare.bench.contact_law`
 computes depth, creep and the rest; measured are the places of bodies before and after the next
-tenth of a second, or of a second where some of them still move."""
+tenth of a second, or of a second where some of them still move or lose contact. Every pair that
+touches meanwhile counts."""
 
 from __future__ import annotations
 
@@ -16,7 +17,15 @@ import mujoco
 import numpy as np
 
 from compare.bench import advice
-from compare.bench.contact_law import LARGEST, Array, contacts, geom_names, replacements
+from compare.bench.contact_law import (
+    LARGEST,
+    Array,
+    Moment,
+    SoftContacts,
+    contacts,
+    geom_names,
+    replacements,
+)
 from compare.bench.settled import (
     WINDOW,
     Advance,
@@ -28,7 +37,7 @@ from compare.bench.settled import (
     measured_slip,
     radii,
     settle,
-    step_to_most_contacts,
+    watch,
 )
 from compare.campaign.progress import part
 from model import InputError
@@ -52,9 +61,9 @@ class Tolerances:
 class PairForecast:
     """Two geoms in contact, at the worst of their contacts: predicted, and measured.
 
-    If speeds still change, loads are means over the second in which the rest was measured. Of a
-    pair that `moves`, as its bodies move on or lose contact, depth, creep and turning aren't
-    predicted: nan."""
+    If speeds still change, or contact is lost, loads are means over the second in which the rest
+    was measured. Of a pair that `moves`, as its bodies move on or lose contact, depth, creep and
+    turning aren't predicted: nan."""
 
     name: str
     members: tuple[int, ...]  # its contacts, by number among all
@@ -173,45 +182,49 @@ def _measured(
     tolerances: Tolerances,
     tell: Tell,
 ) -> advice.AtRest:
-    """The contacts of a settled model and what was measured; `data` is at its end."""
-    model, moving = awake(model), settled.moving
-    if moving:
-        step_to_most_contacts(model, data, step)
-    those, number = contacts(model, data)
-    if not len(number):
-        flexible = _count_flexible(data)
+    """The contacts of a settled model and what was measured; `data` is left at its end."""
+    model, moving, start = awake(model), settled.moving, copy.copy(data)
+    calm = settled.steady and not moving
+    if calm:
+        seen = watch(model, data, step, WINDOW, part(tell, 0, 1 / 2))
+        calm = not seen.lost.any()
+    if not calm:
+        seen = watch(model, data, step, SECOND, part(tell, 1 / 2, 1))
+    several, moments = list[SoftContacts](), list[Moment]()
+    measured, then = list[dict[str, Array]](), dict[tuple[int, int], Array]()
+    for state, pairs in seen.moments(model):
+        those, moment = contacts(model, state, pairs)
+        several.append(those)
+        moments.append(moment)
+        measured.append(measured_slip(model, moment, those, seen.velocity))
+        bear = loads_by_pair(model, state)
+        then |= {pair: bear[pair] for pair in pairs & bear.keys()}
+    if not any(len(moment.number) for moment in moments):
+        flexible = seen.flexible
         also = f"; {flexible} contacts of flexible bodies are left out" if flexible else ""
         also += f"; after {data.time:.3g} s {few(moving.values())}" if moving else ""
         also += f"; gone down: {few(settled.collapsed)}" if settled.collapsed else ""
         raise InputError(f"nothing touches: the model has no contact under load{also}")
-    start, bodies = copy.copy(data), model.geom_bodyid[those.geoms]
+    those = SoftContacts.joined(several)
+    found = {name: np.concatenate([each[name] for each in measured]) for name in measured[0]}
+    bodies = model.geom_bodyid[those.geoms]
     moves = np.array([not moving.keys().isdisjoint(both) for both in bodies.tolist()])
     radius = radii(model)[bodies].min(1)
-    history: list[dict[tuple[int, int], Array]] = []
-
-    def step_and_record(model: Any, data: Any, nstep: int) -> None:
-        for k in range(nstep):
-            tell(k / nstep)
-            step(model, data, 1)
-            history.append(loads_by_pair(model, data))
-
-    time = WINDOW if settled.steady and not moving else SECOND
-    found = measured_slip(model, data, those, number, step_and_record, time)
-    now = loads_by_pair(model, start)
-    for pair in np.unique(those.geoms, axis=0):
-        part, key = (those.geoms == pair).all(1), tuple(pair.tolist())
-        series = np.array([each.get(key, np.zeros(6)) for each in history])
-        moves[part] |= bool((series[:, 0] == 0).any())  # contact is lost
-        if moves[part].any() or time == SECOND:  # the load of a moment may say nothing
-            mean, then = series.mean(0), now[key]
-            friction, sideways = np.hypot.reduce([mean[3:], then[3:]], 1)
-            load = mean[0] / then[0]
-            those.force[part, 0] *= load
-            those.force[part, 1:] *= friction / sideways if sideways > 1e-9 * then[0] else load
-            found["depth_measured"][part] = mean[1] / max(mean[2], 1e-300)
-    own = those.subset(np.ones(len(number), bool))
+    for pair, lost, series in zip(seen.pairs, seen.lost, seen.loads.swapaxes(0, 1), strict=True):
+        own = (those.geoms == pair).all(1)
+        moves[own] |= lost
+        if own.any() and not calm:  # the load of a moment may say nothing
+            mean, borne = series.mean(0), then[tuple(pair.tolist())]
+            friction, sideways = np.hypot.reduce([mean[3:], borne[3:]], 1)
+            load = mean[0] / borne[0]
+            those.force[own, 0] *= load
+            those.force[own, 1:] *= friction / sideways if sideways > 1e-9 * borne[0] else load
+            found["depth_measured"][own] = mean[1] / max(mean[2], 1e-300)
+    those = those.subset(np.ones(len(radius), bool))
     good = tolerances.creep, tolerances.depth or DEPTH * radius
-    return advice.AtRest(model, start, settled, own, number, radius, moves, found, *good)
+    return advice.AtRest(
+        model, start, settled, those, moments, radius, moves, found, seen.flexible, *good
+    )
 
 
 def _without_advice(scene: advice.AtRest) -> Forecast:
@@ -247,10 +260,5 @@ def _without_advice(scene: advice.AtRest) -> Forecast:
     pairs.sort(key=lambda pair: -max(pair.harm.values()))
     alone = min(pair.largest_step for pair in pairs)
     largest = min(alone, those.largest_step(min(alone, LARGEST)))
-    step, flexible = scene.model.opt.timestep, _count_flexible(scene.data)
-    return Forecast(tuple(pairs), step, largest, scene.settled, flexible)
-
-
-def _count_flexible(data: Any) -> int:
-    """How many contacts of flexible bodies there are, which are left out."""
-    return int((data.contact.geom < 0).any(1).sum())
+    step = scene.model.opt.timestep
+    return Forecast(tuple(pairs), step, largest, scene.settled, scene.flexible)

@@ -170,7 +170,7 @@ LEGEND = (
     "Creep: speed at which what should rest slides on; turning: the same of spinning and rolling "
     "friction. Depth: how far bodies sink into one another. Each is predicted from the load of a "
     "contact and its parameters. Found: measured beside it, from where bodies are after the next "
-    "tenth of a second, or a second where speeds still change.",
+    "tenth of a second, or a second where speeds still change or contact is lost.",
     "Cone: share of the friction that a contact can bear which it needs; beyond 100 % it slides. "
     "Short: share of Coulomb's friction that the pyramid lacks in the direction of the load or "
     "slip. Hover: slip speed from which a sliding contact is lost again and again. Step: largest "

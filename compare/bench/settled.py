@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 import mujoco
 import numpy as np
 
-from compare.bench.contact_law import Array, SoftContacts
+from compare.bench.contact_law import Array, Moment, SoftContacts
 from model import InputError, StorageError
 from model.errors import few
 from model.files import why_no_file
@@ -35,6 +35,7 @@ WINDOW, WINDOW_STEPS = 0.1, 50  # a window is so long, s, and of so many steps
 SHORTEST = 1e-7  # of a time step, s: a million in a window
 BENT, SUNK = 0.3, 0.1
 """A robot has collapsed if a driven joint turned so, rad, and it sank by this share of its size."""
+STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 BAD = [getattr(mujoco.mjtWarning, f"mjWARN_BADQ{name}") for name in ("POS", "VEL", "ACC")]
 """What the engine warns of when a model diverges."""
 
@@ -235,41 +236,85 @@ def mean_velocities(model: Any, data: Any, step: Advance, time: float = WINDOW) 
     return np.asarray(moved / (steps * model.opt.timestep))
 
 
-def step_to_most_contacts(model: Any, data: Any, step: Advance) -> None:
-    """Advance to the moment of a window at which most pairs of geoms bear a load."""
-    most = 0
-    for _ in range(WINDOW_STEPS):
-        step(model, data, 1)
-        mujoco.mj_forward(model, data)
-        if (found := len(loads_by_pair(model, data))) > most:
-            most, best = found, copy.copy(data)
-    if most:
-        mujoco.mj_copyData(data, model, best)
+@dataclass(frozen=True)
+class Watched:
+    """What touched in a window of n steps: p pairs of geoms."""
+
+    velocity: Array  # of each body, its mean, (nbody, 6): m/s and rad/s
+    states: Array  # before each step, as `mj_getState` writes them
+    pairs: Array  # (p, 2)
+    loads: Array  # in each step, (n, p, 6), as `loads_by_pair` has them; 0 without contact
+    flexible: int  # contacts of flexible bodies, at most
+
+    @property
+    def lost(self) -> Array:
+        """Whether each pair lost contact, (p,)."""
+        return np.asarray((self.loads[..., 0] == 0).any(0))
+
+    def moments(self, model: Any) -> Iterator[tuple[Any, set[tuple[int, int]]]]:
+        """As few states as give each pair at least half of the most that it bears, and the pairs of
+        each."""
+        borne = self.loads[..., 0]
+        heavy, left = borne >= borne.max(0, initial=0) / 2, np.ones(len(self.pairs), bool)
+        while left.any():
+            now = (heavy & left).sum(1).argmax()
+            data = mujoco.MjData(model)
+            mujoco.mj_setState(model, data, self.states[now], STATE)
+            yield data, set(map(tuple, self.pairs[heavy[now] & left].tolist()))
+            left &= ~heavy[now]
+
+
+def watch(model: Any, data: Any, step: Advance, time: float, tell: Tell) -> Watched:
+    """Advance by a time, s, and note who touches whom in each step.
+
+    What touches at one moment says little: what slides in MuJoCo is in the air most of the time.
+    Raises `UnsettledError` if the model diverges."""
+    states, history, flexible = list[Array](), list[dict[tuple[int, int], Array]](), 0
+    now = mujoco.MjData(model)  # apart, since a step leaves loads of the last stage of RK4
+
+    def step_and_note(model: Any, data: Any, nstep: int) -> None:
+        nonlocal flexible
+        for k in range(nstep):
+            tell(k / nstep)
+            states.append(np.empty(mujoco.mj_stateSize(model, STATE)))
+            mujoco.mj_getState(model, data, states[-1], STATE)
+            mujoco.mj_setState(model, now, states[-1], STATE)
+            mujoco.mj_forward(model, now)
+            history.append(loads_by_pair(model, now))
+            flexible = max(flexible, int((now.contact.geom < 0).any(1).sum()))
+            step(model, data, 1)
+
+    velocity = mean_velocities(model, data, step_and_note, time)
+    pairs = sorted({pair for each in history for pair in each})
+    loads = np.array([[each.get(pair, np.zeros(6)) for pair in pairs] for each in history])
+    shape = len(history), len(pairs), 6
+    return Watched(
+        velocity, np.array(states), np.array(pairs).reshape(-1, 2), loads.reshape(shape), flexible
+    )
 
 
 def loads_by_pair(model: Any, data: Any) -> dict[tuple[int, int], Array]:
-    """What each pair of geoms bears: load, N, depth, m, number, and friction (3), N."""
+    """What each pair of rigid geoms bears: load, N, depth, m, number, and friction (3), N."""
     found: dict[tuple[int, int], Array] = {}
     force = np.zeros(6)
     for k, geoms in enumerate(map(tuple, data.contact.geom.tolist())):
         mujoco.mj_contactForce(model, data, k, force)
-        if force[0] > 0:
+        if force[0] > 0 and min(geoms) >= 0:
             friction = force[1:3] @ data.contact.frame[k, 3:].reshape(2, 3)
             borne = np.array([force[0], -data.contact.dist[k], 1, *friction])
             found[geoms] = found.get(geoms, 0) + borne
     return found
 
 
-def measured_slip(
-    model: Any, data: Any, c: SoftContacts, number: Array, step: Advance, time: float
-) -> dict[str, Array]:
-    """How deep each contact is, and how fast its bodies slip and turn, in a window's mean."""
+def measured_slip(model: Any, moment: Moment, c: SoftContacts, velocity: Array) -> dict[str, Array]:
+    """How deep each contact is, and how fast its bodies slip and turn, by their mean velocities."""
+    data, number = moment.data, moment.number
     found = data.contact
     depth, drift = -found.dist[number], found.surfacevel[number, :2]
     frames = found.frame[number].reshape(-1, 3, 3)
     bodies = model.geom_bodyid[c.geoms]
     lever = found.pos[number][:, None] - data.xipos[bodies]
-    velocity = mean_velocities(model, data, step, time)[bodies]
+    velocity = velocity[bodies]
     first, second = np.moveaxis(velocity, 1, 0)[..., :3]
     turning = np.diff(velocity[..., 3:], axis=1)[:, 0]
     arms = np.cross(velocity[..., 3:], lever)

@@ -280,6 +280,39 @@ def test_a_short_pyramid_is_told_and_a_round_cone_is_not():
     assert "short\n%" not in forecast_page.tables(found)[0][1][0]
 
 
+PULLED = (
+    '<body pos="0 {1} .05"><joint name="{0}x" type="slide" axis="1 0 0" damping="20"/>'
+    '<joint name="{0}y" type="slide" axis="0 1 0" damping="20"/><joint type="slide" axis="0 0 1"/>'
+    f'<geom name="{{0}}" {BLOCK} mass="1"/></body>'
+)
+PULLS = "".join(
+    f'<motor joint="{name}" gear="{pull}"/>'
+    for name, pull in {"onex": 3, "oney": 5.2, "twox": -5, "twoy": 4.5}.items()
+)
+PULLS = f'<actuator>{PULLS}</actuator><keyframe><key ctrl="1 1 1 1"/></keyframe>'
+
+
+@UNADVISED
+@pytest.mark.parametrize("integrator", ["Euler", "RK4"])
+def test_what_hops_as_it_slides_is_named_whichever_body_is_in_the_air(integrator):
+    """Two boxes slide on in different directions, in the air most of the time."""
+    world = GROUND + PULLED.format("one", 0) + PULLED.format("two", 1)
+    text = mjcf(world, f'integrator="{integrator}"', 'friction=".3"', PULLS)
+    for limit in (0.2, 0.5, 1.0, 1.1, 1.7, 3.0):
+        _, _, found = settled(text, limit)
+        pairs = sorted(found.pairs, key=lambda pair: pair.name)
+        assert [pair.name for pair in pairs] == ["floor / one", "floor / two"]
+        for pair in pairs:
+            assert pair.moves
+            assert len(pair.members) == 4
+            assert pair.short == pytest.approx(1 - math.sqrt(1 / 2), abs=5e-3)
+            if integrator == "Euler":
+                assert pair.load == pytest.approx(9.81, rel=1e-2)
+        (said,) = [line for line in forecast_page.sentences(found) if "pyramid" in line]
+        assert "one by 29 %" in said
+        assert "two by 29 %" in said
+
+
 LEVEL = GROUND + box(place="0 0 .0499", angle="0 0 0")
 ROUND = box("0 0 .0499", "0 0 0", "ball", SPHERE)
 UNSAFE = '<flag refsafe="disable"/>'
