@@ -71,15 +71,16 @@ def check_run(p: Parameters, flow: Flow, t_end: float, x0: State, settings: Sett
 
 
 def check_duration(p: Parameters, flow: Flow, t_end: float, x0: State) -> None:
-    """Raise `InputError` if a run in a huge flow is too long to be computed.
+    """Raise `InputError` for an orbit or waves so fast that a run is too long to be computed.
 
-    That is `MAX_RADIANS`, of an orbit or of waves, where they are more than `HUGE` times as fast
-    as sqrt(g/R)."""
-    shortest, name = time_scales.shortest_time(p, flow, t_end, partial(drag.coefficient, p=p), x0)
-    if "omega" in name or "pi f" in name:
-        meaning = f"with {name} = {shortest:.3g} s, so much shorter than sqrt(R/g), it"
-        if shortest * HUGE < math.sqrt(p.R / p.g):
-            check_number("t_end", t_end, "s", Range(high=MAX_RADIANS * shortest), meaning)
+    That is `MAX_RADIANS`, where they are more than `HUGE` times as fast as sqrt(g/R)."""
+    most = max(HUGE * math.sqrt(p.g / p.R), MAX_RADIANS / t_end)
+    for turn in time_scales.turns(p, flow, t_end, x0):
+        if turn.rate > most:
+            end = abs(turn.value) * most / turn.rate
+            within = Range(high=end) if turn.value > 0 else Range(-end)
+            meaning = f"for a run of {t_end:g} s it"
+            check_number(turn.name, turn.value, turn.unit, within, meaning)
 
 
 def start_state(x0: npt.ArrayLike, p: Parameters, settings: Settings) -> State:

@@ -70,8 +70,8 @@ def prepared(
     Raises `InputError` if the time step is too large for the problem."""
     t_end = float(times[-1])
     problem = p, flow, t_end, partial(drag.coefficient, p=p), x
-    shortest, _ = time_scales.shortest_time(*problem)
-    timestep = settings.timestep or min(math.sqrt(p.R / p.g) / 500, shortest / 2)
+    fastest = time_scales.shortest_time(*problem).rate
+    timestep = settings.timestep or min(math.sqrt(p.R / p.g) / 500, 0.5 / fastest)
     time_scales.check_timestep(timestep, *problem)
     meaning = f"for at most {MAX_STEPS:g} steps it"
     check_number("t_end", t_end, "s", Range(high=MAX_STEPS * timestep), meaning)

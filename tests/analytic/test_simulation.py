@@ -5,6 +5,7 @@ import itertools
 import json
 import math
 import os
+import re
 from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
@@ -176,18 +177,26 @@ def test_a_ball_locked_in_the_corner_does_not_rebound(method):
 
 
 @pytest.mark.parametrize(
-    ("flow", "says"), [(None, "1/(2 omega_0) = 5e-10 s"), (Flow.sine(5, 1, 1e9), "1/(2 pi f) = ")]
+    ("flow", "says"),
+    [
+        (None, "omega_0 = -1e+09 rad s-1 is out of range: for a run of 1 s it must be >= -50000"),
+        (Flow.sine(5, 1, 1e9), "f = 1e+09 Hz is out of range: for a run of 1 s it must be <= 159"),
+    ],
 )
 def test_more_of_a_huge_flow_than_can_be_computed_is_refused(flow, says):
     """It would take hours; the first moments of it don't."""
-    p = P.replace(omega_0=1e9)
+    p = P.replace(omega_0=-1e9)
     for method in METHODS:
-        with pytest.raises(InputError, match="t_end = 1 s is out of range: ") as refused:
+        with pytest.raises(InputError, match=re.escape(says)):
             simulate(p, [0] * 6, 1.0, flow, method=method)
-        assert says in str(refused.value)
         assert simulate(p, [0] * 6, 1e-8, flow, method=method).complete
-    with pytest.raises(InputError, match="t_end = 1 s is out of range: "):
+    with pytest.raises(InputError, match=re.escape(says)):
         simulate_many(p, [0] * 6, 1.0, flow)
+
+
+def test_drag_of_a_fast_flow_is_no_reason_to_refuse_a_run():
+    p = P.replace(drag="quadratic", nu_f=1e-6, omega_0=400.0)
+    assert simulate(p, [0] * 6, 10.0).omega_c[-1] == pytest.approx(400.0, abs=0.1)
 
 
 def test_the_end_is_always_a_sample():

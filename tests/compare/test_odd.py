@@ -392,6 +392,11 @@ USERS = {  # a slice of some 330 lines that were drawn by hand: what must be in 
     "sweep --vary omega_0=1:400:3": "half of 1/(2 omega_0), the shortest time of the problem",
     "sweep --vary omega_0=1,2 --start y=-1": "y = -1 m is out of range: to be above the floor",
     "sweep --vary omega_0=1,2 --engine event --start v_h=-1": "v_h = -1 m s-1 is out of range",
+    "basins --across y=0:0.001:2 --up h=0:0.01:2 --start omega_c=-1e9": "error: omega_c = "
+    "-1e+09 rad s-1 is out of range: for a run of 10 s it must be >= -7003.57",
+    "basins --across y=0:0.001:2 --up h=0:0.01:2 --start slip_z=1e9 --mujoco 1": "with slip_z = "
+    "1e+09 rad s-1 it must be <= 5e-08 s",
+    "attractors --random 1 --omega-0 1e9": "error: omega_0 = 1e+09 rad s-1 is out of range: for a",
     "sweep --vary omega_0=1,2 --time 1e-4": "error: time = 0.0001 s is out of range",
 }
 TABLES = {
@@ -545,17 +550,24 @@ def test_a_full_disk_leaves_nothing_behind(words, stocked, tmp_path, monkeypatch
 
 @pytest.mark.parametrize("there", [False, True])
 @pytest.mark.parametrize(
-    "words", ["sweep --vary eta=0.1,0.2 --workers 2", "validate --quick", "figures --figure fig-9"]
+    "words",
+    [
+        "sweep --vary eta=0.1,0.2 --workers 2 -o new",
+        "validate --quick -o new",
+        "figures --figure fig-9 -o new",
+        "explore --no-browser --port 8931",
+    ],
 )
 def test_too_few_handles_leave_nothing_behind(words, there, tmp_path):
     if there:
         (tmp_path / "new").mkdir()
-    limit = f"ulimit -n 16; exec {sys.executable} -m compare {words} -o new"
+    limit = f"ulimit -n 16; exec {sys.executable} -m compare {words}"
     env = os.environ | {"PYTHONPATH": str(ROOT)}
     given = {"cwd": tmp_path, "env": env, "capture_output": True, "text": True}
     done = subprocess.run(["sh", "-c", limit], **given)
     assert done.returncode == 2
     assert done.stderr.splitlines()[-1].startswith("dualball: error: ")
+    assert "Traceback" not in done.stderr
     assert [*tmp_path.rglob("*")] == [tmp_path / "new"] * there
 
 

@@ -17,14 +17,14 @@ import numpy.typing as npt
 
 import analytic
 from analytic import Settings
-from analytic.simulation.settings import start_state
+from analytic.simulation.settings import check_run, start_state
 from compare.campaign.campaign import Campaign
 from compare.campaign.sweep import Axis, check_size
 from compare.campaign.tasks import Task
 from compare.engines.study import MUJOCO
 from compare.method.statistics import hops_on
 from mjsim import RigidContacts
-from model import Case, Contact, InputError, Parameters, State
+from model import Case, Contact, Flow, InputError, Parameters, State
 from model.arrays import Array
 from model.files import reading_json, write_text
 from model.kinematics import VARIABLES
@@ -102,8 +102,8 @@ def basins(
     """Attractors after 10/c of starts on a plane of two state variables, across and up; all others
     as in `start`, or zero.
 
-    Raises `InputError` for an unknown variable, no drag, an impossible start, or a time step that
-    doesn't resolve MuJoCo's."""
+    Raises `InputError` for an unknown variable, no drag, an impossible or far too fast start, or
+    a time step that doesn't resolve MuJoCo's."""
     across, up = plane
     check_names((*start, across.name, up.name), VARIABLES, "state variable")
     if across.name == up.name:
@@ -116,7 +116,7 @@ def basins(
     states = np.tile(base, (len(y), len(x), 1))
     states[..., VARIABLES.index(across.name)], states[..., VARIABLES.index(up.name)] = x, y[:, None]
     for x0 in states[[0, 0, -1, -1], [0, -1, 0, -1]]:  # at corners, before any is simulated
-        start_state(x0, p, Settings())
+        check_run(p, Flow.steady(p.omega_0), lasts, State.one(x0), Settings())
     few = states[::coarse, ::coarse] if coarse else states[:0, :0]
     tasks = [
         Task(
