@@ -55,5 +55,15 @@ class Exact:
         return position + self.timestep * self.case.times[k] * np.eye(3)[0], velocity, spin
 
 
-EXACT, ROUGH = Exact(), Exact(PRECISION="f32")
+class Compiles(Exact):
+    """One that numba compiles before its first step."""
+
+    def build(self, case, timestep):
+        import numba
+
+        numba.njit(lambda x: np.sort(x)[::2].sum())(np.zeros(3))
+        super().build(case, timestep)
+
+
+EXACT, ROUGH, COMPILES = Exact(), Exact(PRECISION="f32"), Compiles()
 """Engines by name, for a league that takes no time."""

@@ -6,6 +6,7 @@ import itertools
 import math
 import statistics
 import threading
+import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -49,6 +50,8 @@ _UNDER_THE_LAW = (
 """What is to be quoted with its number."""
 KINDS = ("sticking", "rolling", "sliding", "landing")
 QUICK = (2e-3,)
+FEW = 4
+"""Cases whose times don't tell yet how long the others take."""
 LEAST = 1e-8  # smaller errors are drawn here
 ENTRY_MARKS = "osv^DPX*<>phd"
 ENTRY_COLOURS = "#0072B2 #D55E00 #009E73 #CC79A7 #E69F00 #56B4E9 #000000 #8C564B".split()
@@ -58,17 +61,16 @@ def measure(
     engines: Mapping[str, Any], steps: Sequence[float] | None, workers: int, show: Show
 ) -> dict[str, list[Result]]:
     """Results by engine, one for each case; engines that can't be used say why."""
-    asked, done = cases(), 0
-    total, over = len(engines) * len(asked), threading.Event()
+    asked, over = cases(), threading.Event()
+    progress = Progress(show, engines, {case.name: float(case.times[-1]) for case in asked})
 
     def results_of(name: str) -> list[Result]:
-        nonlocal done
         found = []
         still = itertools.takewhile(lambda _: not over.is_set(), asked)
         for result in run_all(still, engines[name], steps):
             found.append(result)
-            done += 1
-            show(f"{name}: {result.case}", done, total, 0)
+            progress.note(name, result)
+        progress.over(name)
         return found
 
     with threads(max(workers, 1)) as pool:
@@ -76,6 +78,56 @@ def measure(
             return dict(zip(engines, pool.map(results_of, engines), strict=True))
         finally:
             over.set()
+
+
+class Progress:
+    """How far engines are on the cases. What is shown as done is a share of time.
+
+    That is known once each engine is over or has been on a few cases, since engines differ by any
+    factor. The rest of the cases then takes each as long a simulated second as the median of its
+    own until then: in some an engine compiles."""
+
+    def __init__(self, show: Show, engines: Iterable[str], lasting: Mapping[str, float]) -> None:
+        """`lasting` are the simulated times of the cases, s, in their order."""
+        self._show, self._lasting, self._lock = show, lasting, threading.Lock()
+        self._begun = math.nan
+        """When the time that is left became known, s."""
+        self._last = dict.fromkeys(engines, time.monotonic())
+        """When each engine had its last result, s."""
+        self._ends = dict.fromkeys(engines, math.inf)
+        """When each is expected to be over, s; inf where nobody knows."""
+        self._paces: dict[str, list[float]] = {}
+        """Of engines under way: real seconds for a simulated one, of each case."""
+
+    def note(self, name: str, result: Result) -> None:
+        """Note a result of an engine."""
+        now, names = time.monotonic(), list(self._lasting)
+        with self._lock:
+            passed, self._last[name] = now - self._last[name], now
+            if result.skipped:
+                return
+            paces = self._paces.setdefault(name, [])
+            paces.append(passed / self._lasting[result.case])
+            if len(paces) > FEW:
+                rest = names[names.index(result.case) + 1 :]
+                takes = statistics.median(paces[1:])  # before the first it loads
+                self._ends[name] = now + takes * sum(self._lasting[case] for case in rest)
+            self._tell(f"{name}: {result.case}")
+
+    def over(self, name: str) -> None:
+        """Note that an engine is over."""
+        with self._lock:
+            self._ends[name] = -math.inf
+            self._paces.pop(name, None)
+
+    def _tell(self, what: str) -> None:
+        now, end = time.monotonic(), max(self._ends.values())
+        if end == math.inf:
+            self._show(", ".join(self._paces), 0, 0, 0)
+            return
+        self._begun = now if math.isnan(self._begun) else self._begun
+        passed, left = now - self._begun, max(end - now, 1e-3)
+        self._show(what, round(1000 * passed / (passed + left)), 1000, 0)
 
 
 def summary(league: Mapping[str, Sequence[Result]]) -> Rows:

@@ -34,6 +34,7 @@ from typing import Any
 import numpy as np
 
 from compare.bench.case import TOLERANCE, ContactCase
+from compare.campaign import compiling
 from compare.engines import adapters
 from compare.engines.adapters.scene import TIME_STEPS
 from model import InputError
@@ -156,12 +157,15 @@ class EngineProcess:
         # Not by `multiprocessing`, which runs a person's script a second time unless that is
         # guarded.
         self._pipe, far = multiprocessing.Pipe()
+        self._heard, self._told = multiprocessing.Pipe(duplex=False)
+        compiling.workers.add(self._heard)
+        handles = far.fileno(), self._told.fileno()
         serve = f"from {__name__} import serve_engine; serve_engine"
         paths = [path or str(Path.cwd()) for path in sys.path]
         self._process = subprocess.Popen(
-            [sys.executable, "-c", f"{serve}({far.fileno()})"],
+            [sys.executable, "-c", f"{serve}{handles}"],
             env=os.environ | {"PYTHONPATH": os.pathsep.join(paths)},
-            pass_fds=[far.fileno()],
+            pass_fds=handles,
             stdin=subprocess.PIPE,  # ends when we do
             stdout=subprocess.DEVNULL,  # engines are talkative
             start_new_session=True,  # Ctrl-C is for us
@@ -272,8 +276,9 @@ def _in_words(error: Exception) -> str:
     return f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
 
 
-def serve_engine(handle: int) -> None:
-    """Run in the process of an engine: receive the engine, then cases; send their states.
+def serve_engine(handle: int, told: int) -> None:
+    """Run in the process of an engine: receive the engine, then cases; send their states, and by
+    another handle that it compiles.
 
     It ends with the process that started it."""
 
@@ -282,6 +287,7 @@ def serve_engine(handle: int) -> None:
         os._exit(1)
 
     threading.Thread(target=end_with_parent, daemon=True).start()
+    compiling.tell(Connection(told))
     pipe = Connection(handle)
     with suppress(EOFError, BrokenPipeError):  # there are no more cases, or nobody waits any more
         try:

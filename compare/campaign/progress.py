@@ -119,7 +119,7 @@ def reporter(quiet: bool = False, counted: bool = False, timed: bool = False) ->
             def show(what: str, done: int, total: int, failed: int) -> None:
                 pace.note(done, total)
                 failures = f" [red]{failed} failed[/]" if failed else ""
-                bar.update(line, description=what + failures, completed=done, total=total)
+                bar.update(line, description=what + failures, completed=done, total=total or None)
 
             yield show
     else:  # what is being done at once, and how far it is every `INTERVAL`, whatever happens

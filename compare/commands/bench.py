@@ -41,7 +41,7 @@ def run_league(args: argparse.Namespace) -> int:
         runner.check(chosen[name])
     make_directory(args.output)
     check_ours(args.output / LEAGUE_PAGE, beside=args.output / LEAGUE_JSON)
-    with progress.reporter(args.quiet) as show:
+    with progress.reporter(args.quiet, timed=True) as show:
         found = league.measure(chosen, league.QUICK if args.quick else None, args.workers, show)
     if all(result.skipped for results in found.values() for result in results):
         why = "; ".join(results[0].skipped for results in found.values())

@@ -11,10 +11,12 @@ import base64
 import dataclasses
 import errno
 import json
+import os
 import signal
 import socket
 import tempfile
 from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -52,6 +54,8 @@ answer: a browser that is busy for seconds, as with 3-D without a graphics card,
 the first set again."""
 OIL = 1e-5
 """Viscosity of the fluid, m2 s-1, for laws of drag that need one where the set has none."""
+HANDLES = 64
+"""Files and connections that the server opens, and two or three tabs at once."""
 UNSAID = Parameters.named("reference")
 """The set whose values an address leaves out, whatever the page began with: a link is a setting,
 also for somebody else."""
@@ -249,7 +253,8 @@ def serve(p: Parameters, port: int, show: bool) -> None:
     """Serve the page on the loopback address alone until the process is interrupted; a tab has the
     set `p` at first.
 
-    Raises `InputError` if NiceGUI, an extra, isn't installed, or the port is in use.
+    Raises `InputError` if NiceGUI, an extra, isn't installed, the port is in use, or too few files
+    may be open.
     """
     try:
         from nicegui import app, ui
@@ -269,6 +274,13 @@ def serve(p: Parameters, port: int, show: bool) -> None:
             used = error.errno == errno.EADDRINUSE
             why = "is in use" if used else f"can't be had: {error.strerror}"
             raise InputError(f"port {port} {why}; choose another one by --port") from error
+    with ExitStack() as open_ones:  # the server would end in a traceback
+        try:
+            for _ in range(HANDLES):
+                open_ones.enter_context(Path(os.devnull).open("rb"))
+        except OSError as error:
+            why = f"explore opens {HANDLES} more files and connections: {error.strerror}"
+            raise InputError(f"{why}; 'ulimit -n' says how many may be open") from error
     scene = motion.write(p, 1.0)
     app.add_route("/motion", lambda _: HTMLResponse(scene))
     app.add_middleware(guard.OwnOrigin)

@@ -3,6 +3,7 @@ cases."""
 
 import json
 import re
+from contextlib import closing
 from types import SimpleNamespace
 
 import h5py
@@ -10,9 +11,10 @@ import numpy as np
 import pytest
 
 from compare import bench
-from compare.bench import cases, league, run
+from compare.bench import cases, league, run, runner
 from compare.bench.case import TIME_STEPS, VERSION
 from compare.bench.runner import run_all
+from compare.campaign import compiling
 from model import InputError
 from tests.commands import refused, told
 from tests.exact_cases import CASES
@@ -78,6 +80,35 @@ def test_a_league_says_what_mujoco_is():
     said = "mujoco-free is MuJoCo with free bodies under Coulomb's law"
     assert said in league.caption({"mujoco-free": []})
     assert "Coulomb" not in league.caption({"drake": []})
+
+
+def test_the_time_that_a_league_takes_is_told_once_all_engines_are_at_work(monkeypatch):
+    """One compiles before its first case, one within a case, and one can't be used."""
+    now, told, takes = 0.0, [], {"slow": [40.0] + 9 * [2.0], "quick": [1.0, 0.1, 9.0] + 7 * [0.1]}
+    monkeypatch.setattr(league.time, "monotonic", lambda: now)
+    lasting = {f"case {k}": 1.0 for k in range(10)}
+    far = league.Progress(lambda *said: told.append((now, *said)), [*takes, "none"], lasting)
+    results = [(float(np.cumsum(of)[k]), name, k) for name, of in takes.items() for k in range(10)]
+    far.note("none", runner.Result("case 0", runner.About("none"), skipped="not here"))
+    far.over("none")
+    for at, name, k in sorted(results):
+        now = at
+        far.note(name, runner.Result(f"case {k}", runner.About(name)))
+        if k == 9:
+            far.over(name)
+    assert [said[1:] for said in told[:10]] == 10 * [("quick", 0, 0, 0)]
+    shares = [said for said in told if said[3]]
+    began, end = shares[0][0], sum(takes["slow"])
+    assert began == 48.0
+    for at, _, done, total, _ in shares:
+        assert done / total == pytest.approx((at - began) / (end - began), abs=1e-3)
+
+
+def test_a_league_hears_that_an_engine_compiles(monkeypatch):
+    monkeypatch.setattr(compiling, "workers", set())
+    with closing(runner.EngineProcess("tests.exact_engine:COMPILES")) as trial:
+        trial.result(cases()[0], [1e-3])
+        assert compiling.now().startswith("compiling")
 
 
 def test_a_league_of_one(tmp_path, capsys):
