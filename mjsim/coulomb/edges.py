@@ -77,8 +77,10 @@ def piece_of(model: Any, contact: Any) -> int:
 def lies_below(model: Any, data: Any, edge: Any, floor: Any) -> bool:
     """Whether the piece to which an edge belongs lies below another contact of the same moving
     geom, with another normal."""
+    if abs(cosine(edge, floor)) >= 1 - ALIGNED:
+        return False
     side, other = piece_of(model, edge), piece_of(model, floor)
-    if edge.geoms[1 - side] != floor.geoms[1 - other] or abs(cosine(edge, floor)) >= 1 - ALIGNED:
+    if edge.geoms[1 - side] != floor.geoms[1 - other]:
         return False
     up = 1.0 if other == 0 else -1.0  # normals point from the first geom to the second
     height = height_above(model, data, edge.geoms[side], floor, up)
