@@ -54,7 +54,7 @@ FEW = 4
 """Cases whose times don't tell yet how long the others take."""
 LEAST = 1e-8  # smaller errors are drawn here
 ENTRY_MARKS = "osv^DPX*<>phd"
-ENTRY_COLOURS = "#0072B2 #D55E00 #009E73 #CC79A7 #E69F00 #56B4E9 #000000 #8C564B".split()
+ENTRY_COLOURS = "#005A96 #C04000 #00966C #C7699D #B78000 #2994D4 #000000 #703A30".split()
 
 
 def measure(

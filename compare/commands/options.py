@@ -314,7 +314,8 @@ def terminal(**look: Any) -> Console:
 
     unknown = 80 if sys.stdout.isatty() else 1000
     width = max(shutil.get_terminal_size((unknown, 24)).columns, NARROWEST)
-    return Terminal(**{"width": width} | look)
+    # rich would colour what looks like a path or a number, in two
+    return Terminal(**{"width": width, "highlight": False} | look)
 
 
 def show(data: Any, as_json: bool, *shown: Any) -> None:

@@ -25,17 +25,18 @@ from model.drag import STOKES
 
 T = TypeVar("T")
 COLOURS = {
-    Case.RR: "#0072B2",
-    Case.RS: "#56B4E9",
-    Case.RN: "#999999",
-    Case.SR: "#E69F00",
-    Case.SS: "#D55E00",
-    Case.SN: "#8C564B",
-    Case.NR: "#009E73",
-    Case.NS: "#CC79A7",
+    Case.RR: "#005A96",
+    Case.RS: "#2994D4",
+    Case.RN: "#898989",
+    Case.SR: "#B78000",
+    Case.SS: "#C04000",
+    Case.SN: "#703A30",
+    Case.NR: "#00966C",
+    Case.NS: "#C7699D",
     Case.NN: "#000000",
 }
-"""Okabe and Ito's colours, told apart by colour-blind readers; names tell them apart in print."""
+"""Okabe and Ito's colours, told apart by colour-blind readers, but darker, so that each has a
+contrast of 3 with white; names tell them apart in print."""
 HOPPING = "#7B3294"
 """Of a ball that hops for ever, a motion of several cases."""
 FORCE, SLIP, BALL = "#b3261e", "#6a3d9a", "#f5cc6b"
@@ -205,7 +206,8 @@ def beside(
     leader = {"arrowstyle": "-", "lw": 0.7, "color": "0.4", "shrinkB": 1}
     ha = "center" if offset[0] == 0 else "left" if offset[0] > 0 else "right"
     va = "center" if offset[1] == 0 else "bottom" if offset[1] > 0 else "top"
-    look = NAME | {"color": colour, "zorder": 6, "ha": ha, "va": va}
+    ink = tuple(0.7 * part for part in to_rgb(colour))  # letters need more contrast than lines
+    look = NAME | {"color": ink, "zorder": 6, "ha": ha, "va": va}
     arrow = leader if math.hypot(*offset) > 16 else None
     return axes.annotate(text, (x, y), xytext=offset, arrowprops=arrow, **look)
 

@@ -219,7 +219,7 @@ def draw(run: Trajectory) -> Figure:
     from compare.figures import style  # here, because drawing takes a second to load
 
     t, p = run.time, run.header.parameters
-    blue, green, orange, red, pink = "#0072B2", "#009E73", "#E69F00", "#D55E00", "#CC79A7"
+    blue, green, orange, red, pink = "#005A96", "#00966C", "#B78000", "#C04000", "#C7699D"
     scale, unit = (
         (1e3, "mm") if max(np.abs(run.y).max(), np.abs(run.h).max()) > 1e-5 else (1e6, "µm")
     )

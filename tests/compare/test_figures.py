@@ -5,14 +5,18 @@ import dataclasses
 import functools
 import io
 import pickle
+import re
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 
 import analytic
 from analytic.orbits import orbit_branch
 from compare import plot
+from compare.bench import league
 from compare.figures import style
 from compare.figures.drawing import Diagram, DrawnMotion, Evidence, GapError
 from compare.method.record import Check, Records
@@ -22,12 +26,34 @@ from compare.subjects.attractors import figures as attractors
 from compare.subjects.catalogue import CLAIMS
 from compare.subjects.flowmeter import figures as flowmeter
 from compare.subjects.unsteady import figures as unsteady
-from compare.view import collection, motions
+from compare.view import collection, explore, motions
 from model import InputError, Parameters, State, StorageError, storage
 from tests.commands import refused, told
 from tests.measured import measured
 
 DEPENDS = dict.fromkeys(FIGURES, "μηjκ") | {"fig-7": "μjκ", "fig-8": "jκ"}
+
+
+def contrast(a: str, b: str) -> float:
+    """Of two colours, as WCAG 2 has it."""
+    parts = np.array([to_rgb(a), to_rgb(b)])
+    linear = np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
+    dark, light = sorted(linear @ [0.2126, 0.7152, 0.0722])
+    return (light + 0.05) / (dark + 0.05)
+
+
+def test_what_is_drawn_can_be_seen():
+    drawn = [*style.COLOURS.values(), *league.ENTRY_COLOURS, style.FORCE, style.SLIP]
+    assert min(contrast(colour, "white") for colour in drawn) > 3
+
+
+def test_what_is_written_on_pages_can_be_read():
+    assert contrast(explore.STRONG, "white") > 4.5
+    source = (resources.files("compare.figures") / "pages/templates/base.html").read_text("utf-8")
+    for root in re.findall(":root {(.*?)}", source):
+        colours = dict(re.findall(r"--(\w+):(#\w+)", root))
+        for text in ("ink", "soft", "good", "bad", "warn", "link"):
+            assert min(contrast(colours[text], colours[on]) for on in ("paper", "wash")) > 4.5
 
 
 @pytest.fixture(autouse=True, scope="module")
