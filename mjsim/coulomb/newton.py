@@ -369,8 +369,7 @@ def solve_rigid_island(model: Any, data: Any, memory: Any) -> bool:
     R falls from solution to solution, so that they come near sooner (Rockafellar 1976); it grows
     where Newton's method comes to no end. Then it is again what it was.
     """
-    gives_way, last, scale, solved, least = math.inf, math.inf, R_RISES, True, False
-    multiply_R(memory, scale)
+    gives_way, last, scale, solved, least = math.inf, math.inf, 1.0, True, False
     for _ in range(memory.law.most):
         if least and solved and gives_way <= memory.enough and gives_way >= FALLING * last:
             break

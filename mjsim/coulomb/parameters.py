@@ -108,8 +108,8 @@ SOFTER = 32.0
 """How much larger R is in a step that Newton's method solves, which holds forces until contacts
 give way no more."""
 R_RISES, R_FALLS, R_LEAST = 4.0, 0.5, 2.0**-5
-"""Factors of an island's R: at the start, and where Newton's method comes to no end; after a
-solution; and all of them together at least. Powers of two, which are undone exactly."""
+"""Factors of an island's R: where Newton's method comes to no end; after a solution; and all of
+them together at least. Powers of two, which are undone exactly."""
 NEAR = 0.02
 """Part of `share` from which on R is the least."""
 FALLING = 0.1
