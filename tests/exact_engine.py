@@ -2,6 +2,7 @@
 once."""
 
 import os
+import sys
 import time
 from dataclasses import dataclass
 
@@ -15,6 +16,7 @@ BREAKS = {
     "sphere-slips-down": ("shapes", f"{SHAPES}[(3,), (2,), (3,)]"),
     "sphere-slides-rolls": ("none", f"{SHAPES}[]"),
     "box-stops": ("nan", "diverged by t = 0.04 s at a step of 4 ms"),
+    "drilling-sphere": ("leaves", "SystemExit: 7"),
 }
 """How an engine breaks in a case, and what is said of it."""
 
@@ -39,6 +41,8 @@ class Exact:
             time.sleep(60)
         if self.how == "dies":
             os._exit(3)
+        if self.how == "leaves":
+            sys.exit(7)
         if self.how == "raises":
             raise ValueError("singular matrix")
 
@@ -65,5 +69,14 @@ class Compiles(Exact):
         super().build(case, timestep)
 
 
+class Stepless(Exact):
+    TIMESTEPS = ()
+
+
+class Featured(Exact):
+    FEATURES = "two bodies"
+
+
 EXACT, ROUGH, COMPILES = Exact(), Exact(PRECISION="f32"), Compiles()
+STEPLESS, FEATURED = Stepless(), Featured()
 """Engines by name, for a league that takes no time."""

@@ -24,7 +24,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
@@ -51,6 +51,8 @@ FUNCTIONS = ("build", "step", "state")
 TOLD = {"precision": "PRECISION", "declared": "DECLARED", "note": "NOTE", "steps": "TIMESTEPS"}
 TOLD |= {"features": "FEATURES", "missing": "MISSING"}
 """Where an engine has what it may say of itself, by fields of `About`."""
+SEVERAL = "TIMESTEPS", "FEATURES"
+"""Lists; the others are texts."""
 
 
 @dataclass(frozen=True)
@@ -243,7 +245,8 @@ def _load(given: Any) -> tuple[Any, About]:
         try:
             engine = importlib.import_module(module)
             engine = getattr(engine, member) if member else engine
-        except Exception as error:  # whatever a module or a broken package does when it is imported
+        # whatever a module or a broken package does when it is imported
+        except BaseException as error:
             package, known = _package(given, None)
             if package and version(package) == ABSENT:
                 return None, About(str(given), missing=absent(package))
@@ -256,6 +259,12 @@ def _load(given: Any) -> tuple[Any, About]:
             f"{name} has no function {' nor '.join(lacking)}; an engine has {', '.join(FUNCTIONS)}"
         )
     told = {what: getattr(engine, name) for what, name in TOLD.items() if hasattr(engine, name)}
+    for what, value in [("NAME", name), *((TOLD[each], value) for each, value in told.items())]:
+        several = what in SEVERAL
+        if not isinstance(value, Collection) or isinstance(value, str) == several:
+            raise InputError(f"{what} = {value!r} must be {'a list' if several else 'a text'}")
+    if not told.get("steps", TIME_STEPS):
+        raise InputError("TIMESTEPS is empty")
     about = About(name, version=_package(given, engine)[1], **told)
     check_choice("PRECISION", about.precision, list(FLOORS))
     steps = tuple(check_number("TIMESTEPS", step, "s", POSITIVE) for step in about.steps)
@@ -272,7 +281,7 @@ def _package(given: Any, engine: Any) -> tuple[str, str]:
     return package, f"{package} {here}".strip() + other
 
 
-def _in_words(error: Exception) -> str:
+def _in_words(error: BaseException) -> str:
     return f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
 
 
@@ -327,6 +336,6 @@ def _attempt(engine: Any, case: ContactCase, step: float) -> Any:
                 states[k] = now if at == near else states[k] + (t / step - near) * (now - states[k])
     except NotImplementedError as error:
         return NotImplementedError(str(error))
-    except Exception as error:  # whatever an engine throws loses the case alone
+    except BaseException as error:  # whatever an engine throws loses the case alone
         return None, math.nan, _in_words(error)
     return states, spent / float(case.times[-1]), ""

@@ -50,6 +50,9 @@ NO_ENGINES = (
     (HALF, "SimpleNamespace has no function state; an engine has build, step"),
     ("compare.engines.adapters.mujoco_free:gone", " has no attribute 'gone' (mujoco "),
     (Exact(PRECISION="f128"), "PRECISION = 'f128' must be one of f64, f32"),
+    (Exact(PRECISION=64), "PRECISION = 64 must be a text"),
+    ("tests.exact_engine:STEPLESS", "TIMESTEPS is empty"),
+    ("tests.exact_engine:FEATURED", "FEATURES = 'two bodies' must be a list"),
 )
 
 
