@@ -51,7 +51,7 @@ FUNCTIONS = ("build", "step", "state")
 TOLD = {"precision": "PRECISION", "declared": "DECLARED", "note": "NOTE", "steps": "TIMESTEPS"}
 TOLD |= {"features": "FEATURES", "missing": "MISSING"}
 """Where an engine has what it may say of itself, by fields of `About`."""
-SEVERAL = "TIMESTEPS", "FEATURES"
+ARE_LISTS = "TIMESTEPS", "FEATURES"
 """Lists; the others are texts."""
 
 
@@ -260,7 +260,7 @@ def _load(given: Any) -> tuple[Any, About]:
         )
     told = {what: getattr(engine, name) for what, name in TOLD.items() if hasattr(engine, name)}
     for what, value in [("NAME", name), *((TOLD[each], value) for each, value in told.items())]:
-        several = what in SEVERAL
+        several = what in ARE_LISTS
         if not isinstance(value, Collection) or isinstance(value, str) == several:
             raise InputError(f"{what} = {value!r} must be {'a list' if several else 'a text'}")
     if not told.get("steps", TIME_STEPS):

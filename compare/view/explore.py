@@ -54,7 +54,7 @@ answer: a browser that is busy for seconds, as with 3-D without a graphics card,
 the first set again."""
 OIL = 1e-5
 """Viscosity of the fluid, m2 s-1, for laws of drag that need one where the set has none."""
-STRONG = "#0b57a4"
+BUTTONS = "#0b57a4"
 """Colour of buttons and sliders: that of links on the other pages."""
 HANDLES = 64
 """Files and connections that the server opens, and two or three tabs at once."""
@@ -307,7 +307,7 @@ def page(p: Parameters) -> None:
     except InputError as error:
         tab = Tab(p)
         ui.notify(f"The address can't be followed: {error}", type="negative")
-    ui.colors(primary=STRONG)
+    ui.colors(primary=BUTTONS)
     _heading(ui)
     wide = "flex: 1 1 26rem; min-width: 0"
     with ui.row().classes("w-full"):

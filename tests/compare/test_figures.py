@@ -48,7 +48,7 @@ def test_what_is_drawn_can_be_seen():
 
 
 def test_what_is_written_on_pages_can_be_read():
-    assert contrast(explore.STRONG, "white") > 4.5
+    assert contrast(explore.BUTTONS, "white") > 4.5
     source = (resources.files("compare.figures") / "pages/templates/base.html").read_text("utf-8")
     for root in re.findall(":root {(.*?)}", source):
         colours = dict(re.findall(r"--(\w+):(#\w+)", root))
