@@ -209,6 +209,10 @@ class Sampling:
     # its mean swings again, if less, and that has to die out, too.
     settling_rounds: tuple[float, ...] = (*(0.25,) * 6, 1.0, 1.0, 2.0)
 
+    # Whether a run that is near goes on from where its means lead. Above quick, where drifts are to
+    # be known to a tenth, what is left then of slow motions would be taken for less than it is.
+    settling_leads: bool = True
+
     # settled: flows omega_0 sqrt(R/g) for every kind of start, the first one that which comes to
     # slip
     settled_starts: tuple[tuple[str, Flows], ...] = tuple((how, _FEW) for how in _STARTS)
@@ -266,7 +270,7 @@ class Sampling:
 # fmt: off
 AT_QUICK = Sampling()  # what others change stands below, a line a protocol
 AT_DEFAULT = replace(
-    AT_QUICK, sections=7, settling_rounds=(1.0, 1.0, 2.0, 2.0),
+    AT_QUICK, sections=7, settling_rounds=(1.0, 1.0, 2.0, 2.0), settling_leads=False,
     settled_starts=tuple((how, _FLOWS) for how in _STARTS), settled_sharp=0.1,
     thresholds_width=1e-6, thresholds_fold=3e-4,
     edge_flows=(0.1, 0.17, 0.26, 0.38, 0.6), edge_lines=4, edge_time=60.0,
@@ -326,6 +330,7 @@ OWN_STEPS = replace(
 OWN_STEPS_ABOVE_QUICK = replace(
     OWN_STEPS,
     settling_rounds=(0.45, 1.0, 1.0),
+    settling_leads=False,
     plane_rounds=(1.0, 2.0),
     thresholds_loose=1e3,
     thresholds_rounds=(1.0, 2.0),

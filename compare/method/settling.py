@@ -65,8 +65,8 @@ class SteadyState:
     case: Case
     values: Mapping[str, Estimate] = field(repr=False)
     mean: Array
-    """The state to which its means lead, (8,), from which it goes on: without the oscillation and
-    the drift that it still has."""
+    """Its mean state, (8,), or the one to which its means lead, from which it goes on: without the
+    oscillation, and the drift, that it still has."""
     task: Task = field(repr=False)
     excess: float = math.inf  #: drift or swing divided by its limit for a comparison with theory
     failure: str = ""  #: why it doesn't count as settled
@@ -123,10 +123,11 @@ def settle(
                 failure = f"the run {run}"
                 states[n] = SteadyState(start, Case.NN, {}, start.x0, task, failure=failure)
                 continue
-            state = states[n] = judge_run(start, task, run, loose)
+            state = judge_run(start, task, run, loose, runner.sampling.settling_leads)
+            states[n] = state
             part = task.t_end / duration(start.p, span)
             if left[n] and state.excess > min(part, 1.0) * min(loose, criteria.sharp):
-                near = part >= 1 or state.excess < NEARBY
+                near = part >= 1 or (runner.sampling.settling_leads and state.excess < NEARBY)
                 x = State.of(state.mean if near else run.x[-1])
                 if state.case.A is Contact.N:
                     x = x._replace(y=max(State.of(start.x0).y, 0.0))
@@ -144,8 +145,12 @@ def settle_groups(
     return [[next(states) for _ in group] for group in groups]
 
 
-def judge_run(start: Start, task: Task, run: Trajectory, loose: float = 1.0) -> SteadyState:
+def judge_run(
+    start: Start, task: Task, run: Trajectory, loose: float = 1.0, leads: bool = False
+) -> SteadyState:
     """The state to which a run has settled, or why it has not; `loose` as in `SettlingCriteria`.
+
+    It goes on from its mean, or, if means are to be `leads`, from where they lead.
 
     A run is settled once its drift lets each check resolve twice as much as it should, with no
     quantity swinging by more than a thousandth of its scale, in a window with 98 % of its samples
@@ -158,7 +163,8 @@ def judge_run(start: Start, task: Task, run: Trajectory, loose: float = 1.0) -> 
     series |= {f"force_{name}": values for name, values in acting.items()}
     lengths = len(run.time) // 2, len(run.time) // 8
     states = (_judge_window(start, task, run, series, length, loose) for length in lengths)
-    return min(states, key=lambda state: state.excess)
+    state = min(states, key=lambda state: state.excess)
+    return replace(state, mean=steady_limit(run.x.T, len(run.time) // 2)) if leads else state
 
 
 def _judge_window(
@@ -167,8 +173,8 @@ def _judge_window(
     """The state by so many samples at the end of a run, of which these are series by quantity."""
     p, counts = start.p, np.bincount(run.case[-length:])
     case = Case(int(counts.argmax()))
-    means, drifts = steady_mean(np.stack([*series.values()]), length)
-    mean, drift = (dict(zip(series, row.tolist(), strict=True)) for row in (means, drifts))
+    means, drifts = steady_mean(np.stack([*series.values(), *run.x.T]), length)
+    mean, drift = (dict(zip(series, row.tolist(), strict=False)) for row in (means, drifts))
     sizes, solved = {q: quantity(q).size(p) for q in series}, SOLVED / (p.c * coarse_step(p))
     worst = {
         q: max(drift[each] / sizes[each] for each in group)
@@ -187,8 +193,7 @@ def _judge_window(
     elif max(excess, solving) > loose:
         way = "drifts" if max(drifting, solving) > loose else "swings"
         failure = f"{case.name} still {way}, {max(excess, solving):.2g} times the limit"
-    leads = steady_limit(run.x.T, len(run.time) // 2)
-    return SteadyState(start, case, values, leads, task, excess, failure)
+    return SteadyState(start, case, values, means[len(series) :], task, excess, failure)
 
 
 def _determined(case: Case) -> list[list[str]]:
