@@ -79,9 +79,8 @@ def in_words(flow: Flow, lasts: float, of: Mapping[str, float] | None) -> str:
     if not flow.is_steady and np.ptp(flow(np.linspace(1 - QUARTER, 1, 100) * lasts)):
         return "none: the flow still changes in the last quarter"
     off = float(share(np.array(mean), np.array(drift), flow(lasts)))
-    digits = math.ceil(-math.log10(drift)) + 1 if 0 < drift < 1 else 1
-    shown = f"{mean:z.{min(digits, 9)}f}" if drift else f"{mean:.9g}"
-    said = f"omega_c = {shown} ± {drift:.1g} rad/s over the last quarter"
+    digits = min(max(math.ceil(-math.log10(drift)) + 1, 1), 9) if drift else 9
+    said = f"omega_c = {mean:z.{digits}f} ± {drift:.1g} rad/s over the last quarter"
     if off > DRIFT:
         return f"not settled: {said}, which may change by {percent(off)} % yet"
     return said
