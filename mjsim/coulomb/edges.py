@@ -29,27 +29,41 @@ def leave_inner_edges_out(model: Any, data: Any, memory: Any) -> bool:
     Returns whether there were any.
     """
     contacts, found = contacts_of(memory), engine_contacts(data.contact, data.ncon)
-    types, left_out = integers(model.geom_type, model.ngeom), False
-    on_floor, count = integers(memory.floor_at, memory.contacts), 0
+    on_floor, count, left_out = integers(memory.floor_at, memory.contacts), 0, False
     for i in range(memory.contacts):
-        if piece_of(model, contacts[i]) >= 0:
+        contact = contacts[i]
+        contact.piece = piece_of(model, contact)
+        if contact.piece >= 0:
+            contact.steeper = on_hill(model, contact) and is_steeper(model, data, contact)
             on_floor[count], count = i, count + 1
     for i in on_floor[:count]:
-        edge, others = contacts[i], 0
-        on_hill = types[edge.geoms[piece_of(model, edge)]] == HEIGHTFIELD
-        looks = is_steeper(model, data, edge) if on_hill else closes(model, data, memory, edge)
-        for k in on_floor[: count * looks]:
-            floor = contacts[k]
-            if found[floor.index].exclude:
-                continue
-            if on_hill:
-                others += same_geoms(edge.geoms, floor.geoms) and not is_steeper(model, data, floor)
-            elif floor.load > 0 or floor.gap <= 0:
-                others += lies_below(model, data, edge, floor)
-        if others > on_hill:  # on one point of a hill alone what isn't round would fall over
+        edge, hill = contacts[i], on_hill(model, contacts[i])
+        if not (edge.steeper if hill else closes(model, data, memory, edge)):
+            continue
+        # on one point of a hill alone what isn't round would fall over
+        needed, others = 2 if hill else 1, 0
+        for k in on_floor[:count]:
+            if others < needed and not found[contacts[k].index].exclude:
+                others += makes_inner(model, data, edge, contacts[k], hill)
+        if others == needed:
             leave_out(data, found[edge.index])
             left_out = True
     return left_out
+
+
+@kernel
+def makes_inner(model: Any, data: Any, edge: Any, floor: Any, hill: bool) -> bool:
+    """Whether a contact with the floor tells that another one is with an inner edge."""
+    if hill:
+        return bool(same_geoms(edge.geoms, floor.geoms) and not floor.steeper)
+    return bool((floor.load > 0 or floor.gap <= 0) and lies_below(model, data, edge, floor))
+
+
+@kernel
+def on_hill(model: Any, contact: Any) -> bool:
+    """Whether what is at rest in a contact is a heightfield."""
+    types = integers(model.geom_type, model.ngeom)
+    return bool(types[contact.geoms[contact.piece]] == HEIGHTFIELD)
 
 
 @kernel
@@ -79,11 +93,10 @@ def lies_below(model: Any, data: Any, edge: Any, floor: Any) -> bool:
     geom, with another normal."""
     if abs(cosine(edge, floor)) >= 1 - ALIGNED:
         return False
-    side, other = piece_of(model, edge), piece_of(model, floor)
-    if edge.geoms[1 - side] != floor.geoms[1 - other]:
+    if edge.geoms[1 - edge.piece] != floor.geoms[1 - floor.piece]:
         return False
-    up = 1.0 if other == 0 else -1.0  # normals point from the first geom to the second
-    height = height_above(model, data, edge.geoms[side], floor, up)
+    up = 1.0 if floor.piece == 0 else -1.0  # normals point from the first geom to the second
+    height = height_above(model, data, edge.geoms[edge.piece], floor, up)
     return bool(height <= EDGE * smaller_radius(model, edge.geoms) + max(-floor.gap, 0.0))
 
 
@@ -106,7 +119,7 @@ def height_above(model: Any, data: Any, piece: int, floor: Any, up: float) -> fl
 @kernel
 def is_steeper(model: Any, data: Any, edge: Any) -> bool:
     """Whether a contact with a heightfield is steeper than all cells around; not at its border."""
-    piece, x, y, up = edge.geoms[piece_of(model, edge)], 0.0, 0.0, 0.0
+    piece, x, y, up = edge.geoms[edge.piece], 0.0, 0.0, 0.0
     place = reals(data.geom_xpos, (model.ngeom, 3))[piece]
     axes = reals(data.geom_xmat, (model.ngeom, 3, 3))[piece]
     for j in range(3):

@@ -70,6 +70,8 @@ CONTACT = np.dtype(
         ("cone", _f8),  # MuJoCo's regular coefficient, of the cone in scaled forces
         ("moved", _f8),  # square of how far it has moved on its bodies, m2
         ("closes", _i4),  # whether Newton's method has just found that it does
+        ("piece", _i4),  # which of its geoms is at rest, if the other one isn't; else -1
+        ("steeper", _i4),  # whether it is steeper than all cells around of a heightfield
         ("share", _f8),  # part of friction without a limit that it has
     ],
     align=True,

@@ -100,7 +100,8 @@ EXACT, ROUGH = 1e-9, 1e-6
 rougher changes how contacts share a load that they can bear in many ways: 3e-2 by half a per
 cent of a weight."""
 BLOCK = 4
-"""Rows that are eliminated from another one at once."""
+"""Rows that are eliminated from another one at once, in `newton.subtract_block`, which is written
+for four."""
 FEWER, DECREASE, SHORTEST = 0.5, 1e-4, 1e-3
 """By what a Newton step is shortened; by how much, relative to its length, the residual must fall;
 the shortest."""
