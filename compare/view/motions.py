@@ -219,7 +219,8 @@ def draw(run: Trajectory) -> Figure:
     from compare.figures import style  # here, because drawing takes a second to load
 
     t, p = run.time, run.header.parameters
-    blue, green, orange, red, pink = "#005A96", "#00966C", "#B78000", "#C04000", "#C7699D"
+    cases = Case.RR, Case.NR, Case.SR, Case.SS, Case.NS
+    blue, green, orange, red, pink = (style.COLOURS[case] for case in cases)
     scale, unit = (
         (1e3, "mm") if max(np.abs(run.y).max(), np.abs(run.h).max()) > 1e-5 else (1e6, "µm")
     )
