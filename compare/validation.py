@@ -75,12 +75,14 @@ def validate(
     far = ValidationProgress(progress, len(study.claims), max(count, 1))
     runs = study.output / results.RUNS
     with Campaign(runs, workers, limit=limit, report=far.measuring, passing=True) as campaign:
-        verdicts = judge(study.claims, measure(study, campaign, far), announce, far)
+        found: dict[str, Records] = {}
+        verdicts = judge(study.claims, measure(study, campaign, far, found), announce, far)
         files = study.files(campaign)
-    kept = results.load_measurements(study.output, level.name, files)
-    with processes(count) as work:
-        draw = far.drawing(work.map) if report else None
-        write(study.output, level, files, kept, verdicts, draw)
+        kept = results.load_measurements(study.output, level.name, files, found)
+        here = campaign.fleet if isinstance(workers, int) else processes(count)
+        with here as work:  # those of a scheduler may not see our files
+            draw = far.drawing(work.map) if report else None
+            write(study.output, level, files, kept, verdicts, draw)
     return [verdicts[claim.id] for claim in study.claims]
 
 
@@ -112,9 +114,12 @@ class Study:
         }
         for job in self.jobs(campaign, PROTOCOLS):
             if job.file.exists():
-                name = job.file.relative_to(self.output).as_posix()
-                files[job.runner.engine.name][job.runner.divisor].append(name)
+                files[job.runner.engine.name][job.runner.divisor].append(self.place(job))
         return files
+
+    def place(self, job: Job) -> str:
+        """Where a protocol's measurements are in the results."""
+        return job.file.relative_to(self.output).as_posix()
 
 
 def plan(
@@ -172,8 +177,11 @@ class SoFar:
         return replace(judged, outcome=Outcome.ERROR, error="; ".join(errors)) if errors else judged
 
 
-def measure(study: Study, campaign: Campaign, far: ValidationProgress) -> Iterator[SoFar]:
-    """Carry out what is planned; yield all that is measured, at first and after each protocol."""
+def measure(
+    study: Study, campaign: Campaign, far: ValidationProgress, kept: dict[str, Records]
+) -> Iterator[SoFar]:
+    """Carry out what is planned; yield all that is measured, at first and after each protocol; put
+    what is then in files into `kept`, by their places."""
     jobs = study.jobs(campaign)
     far.costs = {job.name: 0.0 if job.file.exists() else job.cost for job in jobs}
     records = {each.name: dict.fromkeys(each.divisors, Records()) for each in study.engines}
@@ -182,6 +190,8 @@ def measure(study: Study, campaign: Campaign, far: ValidationProgress) -> Iterat
     for job, found in run(jobs):
         far.measured(job.name)
         measured.take(job, found)
+        if isinstance(found, Records):
+            kept[study.place(job)] = found
         yield measured
 
 
@@ -249,7 +259,7 @@ def _in_time(claim: Claim, records: RecordsByEngine) -> Verdict:
 def stored(directory: Path) -> RecordsByEngine:
     """The measurements of the last validation in a directory, read once in a process."""
     summary = results.load(directory)
-    return results.load_measurements(directory, summary.level, summary.measurements)
+    return results.load_measurements(directory, summary.level, summary.measurements, {})
 
 
 def evidence(directory: Path, verdicts: Sequence[Verdict], records: RecordsByEngine) -> Evidence:

@@ -53,13 +53,19 @@ class Summary:
         return cls(level.name, measured, outcomes, provenance)
 
 
-def load_measurements(directory: Path, level: str, files: Files) -> RecordsByEngine:
-    """The measurements in files of a directory, at the level of that name.
+def load_measurements(
+    directory: Path, level: str, files: Files, read: Mapping[str, Records]
+) -> RecordsByEngine:
+    """The measurements in files of a directory, at the level of that name; some are `read`, by
+    their names.
 
     Raises `StorageError` for a file that is not whole, or holds what another engine measured,
     another protocol, or by another plan than its place says."""
 
-    def load(path: Path, engine: str, step: int) -> Records:
+    def load(name: str, engine: str, step: int) -> Records:
+        if name in read:
+            return read[name]
+        path = directory / name
         return record.load(
             path,
             protocol=path.stem,
@@ -72,7 +78,7 @@ def load_measurements(directory: Path, level: str, files: Files) -> RecordsByEng
 
     return {
         engine: {
-            n: sum((load(directory / name, engine, n) for name in names), Records())
+            n: sum((load(name, engine, n) for name in names), Records())
             for n, names in steps.items()
         }
         for engine, steps in files.items()

@@ -106,7 +106,7 @@ class Claim:
 
         return frozenset(n for n, each in enumerate(self.criteria) if predicts(each))
 
-    @property
+    @cached_property
     def protocols(self) -> frozenset[str]:
         """Names of the protocols whose measurements bear on it."""
         return frozenset(criterion.protocol for criterion in self.criteria)

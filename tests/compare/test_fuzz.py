@@ -178,7 +178,7 @@ def test_a_damaged_summary_is_one_line(tmp_path, stocked, count):
 
     def judged(_):
         kept = results.load(directory).measurements
-        results.load_measurements(directory, "QUICK", kept)
+        results.load_measurements(directory, "QUICK", kept, {})
         # What is not a reference to measurements is made anew by judging.
         assert {name for steps in kept.values() for names in steps.values() for name in names} <= {
             "measurements/settled.h5"

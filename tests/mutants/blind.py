@@ -72,7 +72,8 @@ def measured(
     chosen = [each for each in study.protocols if not protocols or each.name in protocols]
     study = replace(study, engines=list(engines), protocols=chosen)
     with Campaign(directory / RUNS, 0, passing=True) as campaign:
-        *_, last = validation.measure(study, campaign, ValidationProgress(show_nothing, 0))
+        far = ValidationProgress(show_nothing, 0)
+        *_, last = validation.measure(study, campaign, far, {})
     for name, error in last.broken.items():
         print(f"{name}: {error}", file=sys.stderr)
     return last.records

@@ -70,8 +70,7 @@ def draw_curves(curves: tuple[Diagram, ...]) -> tuple[Figure, str]:
         above.grid(alpha=0.25)
         style.deviations(below, curve.states, nearest_prediction)
         below.set(xlabel=style.OMEGA_0)
-    for above in panels[0]:
-        names_within(above)
+    names_within(*panels[0])
     sides = zip(("left", "right"), curves, strict=True)
     sets = "; ".join(f"{side}: {style.named(curve.p)}" for side, curve in sides)
     states = [m for curve in curves for m in curve.states]
@@ -181,15 +180,16 @@ def theory(axes: Axes, p: Parameters, fastest: float) -> bifurcation.Thresholds:
     return t
 
 
-def names_within(axes: Axes) -> None:
-    """Move names of curves that would stick out of axes, once these have limits."""
-    if figure := axes.get_figure(root=True):
+def names_within(*panels: Axes) -> None:
+    """Move names of curves that would stick out of axes of a figure, once these have limits."""
+    if figure := panels[0].get_figure(root=True):
         figure.draw_without_rendering()
+    for axes in panels:
         low, high = axes.get_window_extent().get_points()
         for name in axes.findobj(Annotation):
             begin, end = name.get_window_extent().get_points()
             inwards = np.maximum(low - begin, 0) - np.maximum(end - high, 0)
-            name.xyann = name.xyann + inwards * 72 / figure.dpi
+            name.xyann = name.xyann + inwards * 72 / axes.figure.dpi
 
 
 def draw_fall(of: Diagram) -> tuple[Figure, str]:
