@@ -183,13 +183,10 @@ def shift(rows: Any, contact: Any) -> float:
 
 @kernel
 def feedback(contact: Any, estimate: Any) -> float:
-    """How strongly a contact's load acts on its slip, through friction: mu^2 (1 + 1/j) of a
-    ball."""
-    gain = 0.0
-    for t in range(contact.dim - 1):
-        across = contact.mu[t] ** 2 * estimate[contact.address + 1 + t]
-        gain = max(gain, across / estimate[contact.address])
-    return float(gain)
+    """How strongly the load of a contact that slides acts on its slip, through friction: mu^2 by
+    MuJoCo's estimate, which is alike for all directions, and divides friction's by impratio."""
+    across = contact.mu[0] ** 2 * estimate[contact.address + 1]
+    return float(across / estimate[contact.address])
 
 
 @kernel
