@@ -44,7 +44,7 @@ place."""
 table = np.zeros(1, np.int64)
 """The address of the `TABLE` in force."""
 
-_table, _tables = address_of("coulomb_table", table), array_at(TABLE)
+_table, _tables = address_of(f"{__package__}.table", table), array_at(TABLE)
 
 
 @kernel

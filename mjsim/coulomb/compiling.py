@@ -131,10 +131,10 @@ def _called(function: Any) -> set[Any]:
 
 @functools.cache
 def _digest(folders: frozenset[Path]) -> str:
-    """What compiled code depends on: sources, and where MuJoCo keeps its fields."""
+    """What compiled code depends on: sources, their package, and where MuJoCo keeps its fields."""
     files = sorted(path for folder in folders for path in folder.glob("*.py"))
-    text = b"".join(path.read_bytes() for path in files) + mujoco.__version__.encode()
-    return hashlib.sha256(text).hexdigest()[:16]
+    about = f"{__package__}, MuJoCo {mujoco.__version__}".encode()
+    return hashlib.sha256(about + b"".join(map(Path.read_bytes, files))).hexdigest()[:16]
 
 
 def c_address(call: Any) -> int:
@@ -166,7 +166,8 @@ def _alone(function: Any) -> Iterator[None]:
 
 
 def c_function(name: str, address: int, returns: Any, *arguments: Any) -> Any:
-    """A C function for compiled code to call; the linker knows its address by the name."""
+    """A C function for compiled code to call; the linker knows its address by the name, which no
+    other package may have."""
     llvmlite.binding.add_symbol(name, address)
     return ExternalFunction(name, returns(*arguments))
 

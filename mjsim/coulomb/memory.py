@@ -425,7 +425,7 @@ def _make_room(memory: int, contacts: int, rows: int, jacobian: int) -> None:
 
 
 make_room = c_function(
-    "coulomb_make_room",
+    f"{__package__}.make_room",
     ctypes.cast(_make_room, ctypes.c_void_p).value or 0,
     types.void,
     *[types.int64] * 4,

@@ -641,6 +641,28 @@ def test_compiled_code_is_never_stale(tmp_path):
     assert run() == ["6.0", "0"]
 
 
+def test_two_packages_of_the_law_in_a_process(tmp_path):
+    """That of the study and the one that is installed alone, say: each acts, whoever came first."""
+    (tmp_path / "another_law").symlink_to(ROOT / "mjsim" / "coulomb")
+    slide = """
+        import mujoco, mjsim, another_law
+        for law in (mjsim.Coulomb, another_law.Coulomb):
+            model = mujoco.MjModel.from_xml_string(
+                '<mujoco><option gravity="2 0 -9"/><worldbody><geom type="plane" size="1 1 1"/>'
+                '<body pos="0 0 .1"><freejoint/><geom type="box" size=".1 .1 .1" friction=".5"/>'
+                '</body></worldbody></mujoco>')
+            data = mujoco.MjData(model)
+            law(model).step(data, 1000)
+            print(abs(data.qvel[0]) < 1e-9)
+    """
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(slide)],
+        env=os.environ | {"PYTHONPATH": f"{ROOT}{os.pathsep}{tmp_path}"},
+        **{"cwd": tmp_path, "capture_output": True, "text": True, "timeout": TIMEOUT},
+    )
+    assert done.stdout.split() == ["True", "True"], done.stderr
+
+
 # -- anything --------------------------------------------------------------------------------------
 
 FASTER = 20.0
