@@ -465,27 +465,31 @@ def _check_friction(model: Any) -> None:
 
 def _see_ahead(model: Any) -> None:
     """Widen contact margins to what a body that fell through the scene moves in a step, at most a
-    fifth of its radius; where something sticks, to a fall of a step: adhesion acts within them.
+    fifth of its radius; to a fall of a step where something sticks, as adhesion acts within them,
+    and of what crowds a heightfield.
 
     Colliders take a body that is smaller than the margin for one that overlaps.
     """
     gravity, h = float(np.linalg.norm(model.opt.gravity)) or EARTH, model.opt.timestep
-    ahead = gravity * h**2 if _sticks(model) else h * math.sqrt(2 * gravity * model.stat.extent)
+    fall = gravity * h**2
+    ahead = fall if _sticks(model) else h * math.sqrt(2 * gravity * model.stat.extent)
     most = model.geom_rbound / 5
-    own = np.minimum(ahead, most)
-    if MARGINS_ADD_UP:  # each of two geoms has its half, what is at rest that of the smallest body
-        moves = model.body_weldid[model.geom_bodyid] > 0
-        own = np.where(moves, own, own.min(where=moves & (most > 0), initial=ahead)) / 2
-    np.maximum(model.geom_margin, own, out=model.geom_margin)
-    pairs = [model.pair_geom1, model.pair_geom2]
-    np.maximum(
-        model.pair_margin,
-        np.minimum(ahead, most[np.array(pairs)].max(axis=0)),
-        out=model.pair_margin,
-    )
+    own = np.minimum(np.where(_crowds(model), min(ahead, fall), ahead), most)
+    moves = model.body_weldid[model.geom_bodyid] > 0  # what is at rest has that of the smallest
+    own = np.where(moves, own, own.min(where=moves & (most > 0), initial=ahead))
+    np.maximum(model.geom_margin, own / 2 if MARGINS_ADD_UP else own, out=model.geom_margin)
+    pairs = np.array([model.pair_geom1, model.pair_geom2])
+    np.maximum(model.pair_margin, own[pairs].max(axis=0), out=model.pair_margin)
     if model.opt.enableflags & _OVERRIDE:  # one margin for all contacts
-        least = most.min(where=most > 0, initial=ahead)
-        model.opt.o_margin = max(model.opt.o_margin, least)
+        model.opt.o_margin = max(model.opt.o_margin, own.min(initial=ahead))
+
+
+def _crowds(model: Any) -> npt.NDArray[np.bool_]:
+    """Which geoms are wider than four cells of a heightfield: of 50 points that MuJoCo takes of a
+    pair, those ahead would leave none to what is below."""
+    sizes = 4 * model.hfield_size[:, 0] * model.hfield_size[:, 1]
+    cells = sizes / ((model.hfield_ncol - 1) * (model.hfield_nrow - 1))
+    return np.asarray(2 * model.geom_rbound > 4 * np.sqrt(cells.min(initial=math.inf)))
 
 
 def _sticks(model: Any) -> bool:

@@ -209,6 +209,16 @@ def test_what_slides_over_a_heightfield_stops_at_no_edge_of_its_cells(rigid, geo
     assert np.linalg.norm(data.qpos[:3] - begin) == pytest.approx(way, rel=0.02)
 
 
+@pytest.mark.parametrize("geom", [BOX, 'type="capsule" size=".05 .05"'])
+def test_a_finely_meshed_heightfield_holds_what_covers_many_of_its_cells(geom):
+    """MuJoCo takes 50 points of it: of more, those within the margin pushed out those below."""
+    hill = '<hfield name="hill" nrow="81" ncol="81" size=".6 .6 .1 .1"/>'
+    bodies = '<geom type="hfield" hfield="hill"/>' + free("body", "0 0 .12", geom, euler="50 20 0")
+    made, data = world(bodies, more=f"<asset>{hill}</asset>", mu=0.3)
+    Coulomb(made, rigid=True).step(data, 1000)
+    assert data.qpos[2] == pytest.approx(0.05, abs=1e-4)
+
+
 def test_what_hangs_below_the_floor_on_which_a_body_slides_stops_at_a_wall():
     """The wall lies below the contacts that bear the body, but not all of the body lies above."""
     high = '<geom type="box" size="2 .3 .1" pos="0 0 .8"/>'
