@@ -404,9 +404,8 @@ def is_fixed(model: Any, memory: Any, old: Any, turning: float) -> bool:
     creep = 0.0
     for axis in range(3 if old.state == STICKS else 0):
         creep += old.velocity[axis] ** 2
-    carried = old.belt if old.state == STICKS else 0.0
     rolled = memory.law.fixed * turning * smaller_radius(model, old.geoms)
-    way = model.opt.timestep * (rolled + carried + math.sqrt(creep))
+    way = model.opt.timestep * (rolled + old.belt + math.sqrt(creep))
     return bool(old.moved <= 2 * way**2)
 
 

@@ -101,27 +101,39 @@ def store_velocities(model: Any, data: Any, memory: Any) -> None:
 @kernel
 def add_turning(model: Any, data: Any, memory: Any, since: float, moved: bool) -> None:
     """Let contacts that stick turn along with their bodies, or roll: rows leave out that Jacobians
-    change.
-
-    What is added is -dJ/dt v, less half of the share that a row loses of its velocity in a step:
-    then friction does no work, before the turning or after it. Rigid contacts lose all, and a disc
-    that precesses keeps its energy. A call at the time of the last one, `since` 0 s, adds the same.
-    """
-    contacts, rows, rigid = contacts_of(memory), rows_of(memory), memory.law.rigid
-    velocity = reals(data.efc_vel, data.nefc)
-    damping = reals(data.efc_KBIP, (data.nefc, 4))
+    change. A call at the time of the last one, `since` 0 s, adds the same."""
+    contacts, rows = contacts_of(memory), rows_of(memory)
     for i in range(memory.contacts):
         contact = contacts[i]
-        sticks = contact.state == STICKS
-        turns = moved and since > 0 and contact.dim > 1 and (rigid or sticks)
+        if since != 0:
+            known = moved and contact.dim > 1 and contact.velocity[0] < math.inf
+            find_turning(model, data, memory, contact, since, known)
         for axis in range(min(contact.dim, 3)):
-            if since != 0:
-                contact.turned[axis] = 0.0
-            first = 0 if rigid and sticks and contact.load > 0 else 1
-            if turns and axis >= first and contact.velocity[0] < math.inf:
-                lost = min(model.opt.timestep * damping[contact.address + 1, 1], 1.0)
-                change = velocity[contact.address + axis]
-                for j in range(3):
-                    change -= contact.frame[axis, j] * contact.velocity[j]
-                contact.turned[axis] = change * (1 - (1.0 if rigid else lost) / 2) / since
             rows[contact.address + axis].reference -= contact.turned[axis]
+
+
+@kernel
+def find_turning(
+    model: Any, data: Any, memory: Any, contact: Any, since: float, known: bool
+) -> None:
+    """Find -dJ/dt v of a contact, less half of the share that a row loses of its velocity in a
+    step: then friction does no work, before the turning or after it. Rigid contacts lose all, and a
+    disc that precesses keeps its energy.
+
+    Of what slides softly there is none, unless friction could end that within the contact's time:
+    else that would never end on a turntable.
+    """
+    rigid, sticks = memory.law.rigid, contact.state == STICKS
+    velocity, first = reals(data.efc_vel, data.nefc), contact.address
+    damping = reals(data.efc_KBIP, (data.nefc, 4))[first + 1, 1] if known else 0.0
+    lost = 1.0 if rigid else min(model.opt.timestep * damping, 1.0)
+    slip = math.hypot(velocity[first + 1], velocity[first + 2]) if known else 0.0
+    stops = contact.mu[0] * contact.load * reals(data.efc_diagA, data.nefc)[first]
+    known = known and (rigid or sticks or slip * damping < stops)
+    for axis in range(3):
+        contact.turned[axis] = 0.0
+        if known and (axis > 0 or (rigid and sticks and contact.load > 0)):
+            change = velocity[first + axis]
+            for j in range(3):
+                change -= contact.frame[axis, j] * contact.velocity[j]
+            contact.turned[axis] = change * (1 - lost / 2) / since
