@@ -99,6 +99,12 @@ WARNINGS = tuple(
     int(getattr(mujoco.mjtWarning, f"mjWARN_BAD{what}")) for what in ("QPOS", "QVEL", "QACC")
 )
 """Those after which MuJoCo has reset a simulation."""
+MOST_POINTS = 50
+"""Points that a collider finds of a pair at most; they begin with distance, place and normal."""
+POINT = structure("mjPreContact" if "mjPreContact" in structs.STRUCTS else "mjContact").itemsize
+CYLINDER, BOX, MESH = (
+    int(getattr(mujoco.mjtGeom, f"mjGEOM_{kind}")) for kind in ("CYLINDER", "BOX", "MESH")
+)
 
 
 # -- addresses in compiled code --------------------------------------------------------------------
@@ -147,6 +153,14 @@ def _function(name: str, returns: Any = types.void, arguments: int = 2) -> Any:
     return c_function(name, address or 0, returns, *[types.intp] * arguments)
 
 
+def _collider(name: str, one: int, other: int) -> Any:
+    """What finds the points of two kinds of geoms, within a margin."""
+    row = ctypes.c_void_p * int(mujoco.mjtGeom.mjNGEOMTYPES)
+    address = (row * len(row())).in_dll(LIBRARY, "mjCOLLISIONFUNC")[one][other]
+    arguments = *[types.intp] * 3, types.int32, types.int32, types.float64
+    return c_function(name, address or 0, types.int32, *arguments)
+
+
 mj_step = _function("mj_step")
 mj_fwdActuation, mj_fwdAcceleration = _function("mj_fwdActuation"), _function("mj_fwdAcceleration")
 mj_fwdConstraint, mj_fwdVelocity = _function("mj_fwdConstraint"), _function("mj_fwdVelocity")
@@ -155,6 +169,7 @@ mj_projectConstraint, mj_factorM = _function("mj_projectConstraint"), _function(
 mj_isSparse = _function("mj_isSparse", types.int32, 1)
 mj_addContact = _function("mj_addContact", types.int32, 3)
 mjd_smooth_vel = _function("mjd_smooth_vel", arguments=3)
+mjc_Convex = _collider("mjc_Convex", CYLINDER, BOX)
 
 
 # -- does it lie in memory as it is said? ----------------------------------------------------------

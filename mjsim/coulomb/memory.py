@@ -22,7 +22,7 @@ import numpy.typing as npt
 from numba import types
 
 from .compiling import c_function, view
-from .engine import MJ_CONTACT, array_at, integers, reals
+from .engine import MJ_CONTACT, MOST_POINTS, POINT, array_at, integers, reals
 from .parameters import LAW, Law
 
 NEW, OPEN, STICKS, SLIDES = range(4)
@@ -174,8 +174,8 @@ MEMORY = np.dtype(
         ("braked_is", _f8),
         *((f"room_{name}", _i8) for name in ("contacts", "rows", "jacobian")),
         *((f"{name}_at", _i8) for name in ("contact", "before", "row", "jacobian", "column")),
-        *((f"{name}_at", _i8) for name in ("dry", "pose", "pair", "point", "xpos", "xmat", "body")),
-        *((f"{name}_at", _i8) for name in ("floor", "restitution", "dof")),
+        *((f"{name}_at", _i8) for name in ("dry", "pose", "pair", "xpos", "xmat", "body")),
+        *((f"{name}_at", _i8) for name in ("point", "patch", "floor", "restitution", "dof")),
         # the island that is solved: how many degrees of freedom and units it has; by their numbers
         # in it, accelerations, those tried, a step to these, what is left of the equations
         ("size", _i8),
@@ -284,6 +284,7 @@ class Simulation:
         self.bodies = self._own("body", free_bodies(model) if law.rigid else np.zeros(0, FREE_BODY))
         record["free_bodies"] = len(self.bodies)
         self._own("point", np.zeros(MJ_CONTACT.itemsize // 8, np.int64))
+        self._own("patch", np.zeros(MOST_POINTS * POINT // 8))
         record["bounces"] = len(law.restitution)
         self._own("restitution", np.array(law.restitution, np.float64))
         record["nv"] = nv = model.nv if law.rigid else 0

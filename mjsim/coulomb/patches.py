@@ -1,5 +1,5 @@
-"""Patches of contact: points of flat faces that a collider drops by turns are put back; those that
-it adds are left out."""
+"""Patches of contact: points of flat faces that a collider drops by turns, or doesn't take, are put
+back; those that it adds are left out."""
 
 from __future__ import annotations
 
@@ -9,16 +9,24 @@ from typing import Any
 from .compiling import kernel
 from .contacts import SIZE, WORDS, copy, leave_out, same_geoms
 from .engine import (
+    BOX,
+    CYLINDER,
+    MESH,
+    MOST_POINTS,
+    POINT,
     engine_contacts,
+    integers,
     mj_addContact,
     mj_fwdVelocity,
     mj_island,
     mj_makeConstraint,
     mj_projectConstraint,
+    mjc_Convex,
     reals,
 )
 from .memory import NEW, contacts_at, contacts_of
 from .parameters import AT_MOST, CORNER, UNMOVED
+from .rigid import depth_kept
 
 
 @kernel
@@ -44,6 +52,59 @@ def put_points_back(model: Any, data: Any, memory: Any) -> bool:
     if added:
         make_rows_anew(memory)
     return added > 0
+
+
+@kernel
+def add_points_below(model: Any, data: Any, memory: Any) -> bool:
+    """Add points of faces that the collider hasn't taken: those without margin.
+
+    It takes four of them, however far they are within the margin: a body that tips about two would
+    have none where it comes down. Returns whether there were any.
+    """
+    contacts, first, added = contacts_of(memory), 0, 0
+    while first < memory.contacts:
+        after, rises = first, False
+        while after < memory.contacts and same_geoms(contacts[after].geoms, contacts[first].geoms):
+            contact, after = contacts[after], after + 1
+            rises = rises or contact.gap > depth_kept(model, memory, contact)
+        if rises and after - first >= 4 and has_flat_faces(model, contacts[first].geoms):
+            added += add_points_without_margin(model, data, memory, contacts[first])
+        first = after
+    if added:
+        make_rows_anew(memory)
+    return added > 0
+
+
+@kernel
+def has_flat_faces(model: Any, geoms: Any) -> bool:
+    """Whether the points of two geoms are those of two faces of which one may be no rectangle."""
+    types = integers(model.geom_type, model.ngeom)
+    least, most = min(types[geoms[0]], types[geoms[1]]), max(types[geoms[0]], types[geoms[1]])
+    return bool(least >= CYLINDER and most <= MESH and not least == most == BOX)
+
+
+@kernel
+def add_points_without_margin(model: Any, data: Any, memory: Any, like: Any) -> int:
+    """Add the points that two geoms have without margin; those of a pair like this contact."""
+    stride, added = POINT // 8, 0
+    points, radius = (
+        reals(memory.patch_at, MOST_POINTS * stride),
+        reals(model.geom_rbound, model.ngeom),
+    )
+    near = memory.law.near * max(radius[like.geoms[0]], radius[like.geoms[1]])
+    count = mjc_Convex(
+        memory.model, memory.data, memory.patch_at, like.geoms[0], like.geoms[1], 0.0
+    )
+    for k in range(count):
+        point = points[k * stride : k * stride + 7]
+        like.gap = point[0]
+        for j in range(3):
+            like.pos[j], like.frame[0, j] = point[1 + j], point[4 + j]
+        if like.gap < 0 and not has_near(data, like, near):
+            complete_frame(like.frame)
+            add_point(data, memory, like)
+            added += 1
+    return added
 
 
 @kernel
@@ -115,12 +176,20 @@ def is_lost(data: Any, memory: Any, old: Any, near: float) -> bool:
     for i in range(data.ncon):
         if same_geoms(found[i].geom, old.geoms):
             left, old.index = left + 1, i
-            square = 0.0
-            for j in range(3):
-                square += (found[i].pos[j] - old.pos[j]) ** 2
-            if square <= near**2:
-                return False
-    return bool(0 < left <= had)
+    return bool(0 < left <= had and not has_near(data, old, near))
+
+
+@kernel
+def has_near(data: Any, contact: Any, near: float) -> bool:
+    """Whether mjData has a point of this pair of geoms near this one."""
+    found = engine_contacts(data.contact, data.ncon)
+    for i in range(data.ncon):
+        square = 0.0
+        for j in range(3):
+            square += (found[i].pos[j] - contact.pos[j]) ** 2
+        if square <= near**2 and same_geoms(found[i].geom, contact.geoms):
+            return True
+    return False
 
 
 @kernel

@@ -29,7 +29,7 @@ from .friction import (
 from .memory import CONTACT_ROW, DRY, contacts_of, memories, rows_of
 from .newton import solve_contacts
 from .parameters import EARTH, NEXT, OVER, SOFTER
-from .patches import leave_added_points_out, put_points_back
+from .patches import add_points_below, leave_added_points_out, put_points_back
 from .rigid import (
     add_dampers,
     oppose_slip_at_mid_step,
@@ -105,6 +105,8 @@ def update_contacts(
     anew = False
     if match(model, data, memory) > memory.least:
         anew = put_points_back(model, data, memory)
+    if memory.law.rigid:
+        anew |= add_points_below(model, data, memory)
     if anew or leave_added_points_out(model, data, memory):
         find(model, data, memory)
         match(model, data, memory)

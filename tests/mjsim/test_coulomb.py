@@ -753,6 +753,27 @@ def test_what_lies_on_its_smooth_side_stays(shape, place):
     assert made.opt.ccd_tolerance == 1e-6
 
 
+OCTAGON = " ".join(
+    f"{0.05 * math.cos(k * math.pi / 4)} {0.05 * math.sin(k * math.pi / 4)} {z}"
+    for k in range(8)
+    for z in (-0.05, 0.05)
+)
+
+
+@WAYS
+@pytest.mark.parametrize("geom", ['type="cylinder" size=".05 .05"', 'type="mesh" mesh="octagon"'])
+@pytest.mark.parametrize("direction", np.linspace(0.1, 5.5, 5))
+def test_what_stands_on_many_corners_tips_over_none_of_them_too_early(rigid, geom, direction):
+    """It would tip by 1.13 times the pull. Of a face the collider takes four points within
+    the margin, also those that rise."""
+    bodies = '<geom type="box" size="1 1 .1" pos="0 0 -.1"/>' + free("body", "0 0 .05", geom)
+    mesh = f'<asset><mesh name="octagon" vertex="{OCTAGON}"/></asset>'
+    made, data = world(bodies, more=mesh, mu=2.0)
+    made.opt.gravity[:2] = 8.0 * math.cos(direction), 8.0 * math.sin(direction)
+    Coulomb(made, rigid=rigid).step(data, 250)
+    assert data.body("body").xmat[8] > math.cos(math.radians(0.5))
+
+
 @WAYS
 def test_tendons_move_beside_what_rests(rigid):
     """A body without geoms swings on a tendon with dry friction while a box lies there: the
