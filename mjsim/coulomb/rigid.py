@@ -14,7 +14,7 @@ from .compiling import kernel
 from .contacts import cosine, smaller_radius
 from .engine import integers, mj_factorM, mj_fwdActuation, mjd_smooth_vel, reals
 from .friction import shift
-from .memory import OPEN, SLIDES, contacts_of, rows_of
+from .memory import CONTACT_ROW, DRY, OPEN, SLIDES, contacts_of, rows_of
 from .parameters import ALIGNED, APART, BOUNCES, NARROW, STUCK, USUAL_STEP
 from .rows import times
 
@@ -23,7 +23,8 @@ from .rows import times
 
 @kernel
 def stiffen(model: Any, data: Any, memory: Any) -> None:
-    """Make contacts stiff, and let them ask for velocities at the end of the step."""
+    """Make contacts and dry friction stiff, and let them ask for velocities at the end of the
+    step."""
     contacts, h = contacts_of(memory), model.opt.timestep
     estimate, velocity = reals(data.efc_diagA, data.nefc), reals(data.efc_vel, data.nefc)
     rows = rows_of(memory)
@@ -36,6 +37,9 @@ def stiffen(model: Any, data: Any, memory: Any) -> None:
         for r in range(first, first + contact.dim):
             rows[r].R *= factor
             rows[r].reference = ((goal if r == first else 0.0) - velocity[r]) / h
+    for r in range(memory.first_dry, memory.first_dry + memory.dry):
+        rows[r].R = memory.law.regularisation * estimate[r]
+        rows[r].reference = -velocity[r] / h
 
 
 @kernel
@@ -197,13 +201,12 @@ def in_plane(one: Any, other: Any) -> Any:
 
 @kernel
 def write_regularisation(data: Any, memory: Any) -> None:
-    """Tell the R of contacts to all places where MuJoCo keeps it: D, islands."""
+    """Tell the R of contacts and dry friction to all places where MuJoCo keeps it: D, islands."""
     R, D = reals(data.efc_R, data.nefc), reals(data.efc_D, data.nefc)
     island_R, island_D = reals(data.iefc_R, data.nefc), reals(data.iefc_D, data.nefc)
-    place, contacts = integers(data.map_efc2iefc, data.nefc), contacts_of(memory)
-    rows = rows_of(memory)
-    for i in range(memory.contacts):
-        for r in range(contacts[i].address, contacts[i].address + contacts[i].dim):
+    place, rows = integers(data.map_efc2iefc, data.nefc), rows_of(memory)
+    for r in range(len(rows)):
+        if rows[r].kind == DRY or rows[r].kind == CONTACT_ROW:
             R[r], D[r] = rows[r].R, 1 / rows[r].R
             if data.nisland > 0:
                 island_R[place[r]], island_D[place[r]] = R[r], D[r]
