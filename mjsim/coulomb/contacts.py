@@ -10,7 +10,17 @@ import math
 from typing import Any
 
 from .compiling import kernel
-from .engine import MJ_CONTACT, engine_contacts, integers, mj_isSparse, reals, words
+from .engine import (
+    BOX,
+    HEIGHTFIELD,
+    MESH,
+    MJ_CONTACT,
+    engine_contacts,
+    integers,
+    mj_isSparse,
+    reals,
+    words,
+)
 from .memory import (
     CONTACT_ROW,
     DRY,
@@ -46,6 +56,23 @@ def smaller_radius(model: Any, geoms: Any) -> float:
 def same_geoms(one: Any, other: Any) -> bool:
     """Whether two contacts are of the same geoms."""
     return bool(one[0] == other[0] and one[1] == other[1])
+
+
+@kernel
+def kinds(model: Any, geoms: Any) -> Any:
+    """The kinds of two geoms, in MuJoCo's order."""
+    types = integers(model.geom_type, model.ngeom)
+    one, other = types[geoms[0]], types[geoms[1]]
+    return min(one, other), max(one, other)
+
+
+@kernel
+def hops(model: Any, geoms: Any) -> bool:
+    """Whether a contact may be with one corner now, with another in the next step: of a flat body
+    on a cell of a heightfield the collider has one point. (Soft ones may have come deep meanwhile.)
+    """
+    least, most = kinds(model, geoms)
+    return bool(least == HEIGHTFIELD and BOX <= most <= MESH)
 
 
 @kernel
@@ -341,7 +368,8 @@ def nearest(model: Any, memory: Any, old: Any) -> int:
 
 @kernel
 def match(model: Any, data: Any, memory: Any) -> float:
-    """Let contacts inherit from those before; if two have become one, how far one has moved, m."""
+    """Let contacts inherit from those before; if two have become one, or one may have hopped, how
+    far one has moved, m."""
     contacts, before = contacts_of(memory), contacts_at(memory.before_at, memory.contacts_before)
     sort_pairs(model, memory)
     farthest, some_merged = 0.0, False
@@ -354,7 +382,8 @@ def match(model: Any, data: Any, memory: Any) -> float:
             old.moved = square_apart(contacts[k], old) if k >= 0 else math.inf
         if k >= 0:
             farthest = max(farthest, old.moved)
-            some_merged = some_merged or contacts[k].state != NEW
+            hopped = memory.law.rigid and hops(model, old.geoms)
+            some_merged = some_merged or contacts[k].state != NEW or hopped
             inherit(model, data, memory, contacts[k], old)
     return math.sqrt(farthest / 2) if some_merged else 0.0
 

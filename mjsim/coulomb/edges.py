@@ -11,15 +11,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import mujoco
-
 from .compiling import kernel
 from .contacts import cosine, leave_out, same_geoms, smaller_radius
-from .engine import engine_contacts, integers, reals, singles
+from .engine import HEIGHTFIELD, engine_contacts, integers, reals, singles
 from .memory import contacts_of
 from .parameters import ALIGNED, AT_MOST, EDGE
-
-HEIGHTFIELD = int(mujoco.mjtGeom.mjGEOM_HFIELD)
 
 
 @kernel

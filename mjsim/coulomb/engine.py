@@ -102,8 +102,8 @@ WARNINGS = tuple(
 MOST_POINTS = 50
 """Points that a collider finds of a pair at most; they begin with distance, place and normal."""
 POINT = structure("mjPreContact" if "mjPreContact" in structs.STRUCTS else "mjContact").itemsize
-CYLINDER, BOX, MESH = (
-    int(getattr(mujoco.mjtGeom, f"mjGEOM_{kind}")) for kind in ("CYLINDER", "BOX", "MESH")
+HEIGHTFIELD, CYLINDER, BOX, MESH = (
+    int(getattr(mujoco.mjtGeom, f"mjGEOM_{kind}")) for kind in ("HFIELD", "CYLINDER", "BOX", "MESH")
 )
 
 

@@ -7,7 +7,7 @@ import math
 from typing import Any
 
 from .compiling import kernel
-from .contacts import SIZE, WORDS, copy, leave_out, same_geoms
+from .contacts import SIZE, WORDS, copy, kinds, leave_out, same_geoms
 from .engine import (
     BOX,
     CYLINDER,
@@ -15,7 +15,6 @@ from .engine import (
     MOST_POINTS,
     POINT,
     engine_contacts,
-    integers,
     mj_addContact,
     mj_fwdVelocity,
     mj_island,
@@ -78,8 +77,7 @@ def add_points_below(model: Any, data: Any, memory: Any) -> bool:
 @kernel
 def has_flat_faces(model: Any, geoms: Any) -> bool:
     """Whether the points of two geoms are those of two faces of which one may be no rectangle."""
-    types = integers(model.geom_type, model.ngeom)
-    least, most = min(types[geoms[0]], types[geoms[1]]), max(types[geoms[0]], types[geoms[1]])
+    least, most = kinds(model, geoms)
     return bool(least >= CYLINDER and most <= MESH and not least == most == BOX)
 
 

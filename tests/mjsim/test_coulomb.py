@@ -219,6 +219,22 @@ def test_a_finely_meshed_heightfield_holds_what_covers_many_of_its_cells(geom):
     assert data.qpos[2] == pytest.approx(0.05, abs=1e-4)
 
 
+@pytest.mark.parametrize("seed", [6, 12, 19])
+def test_what_lands_on_a_coarse_heightfield_comes_to_rest(seed):
+    """On a cell the collider has one point of it, of one corner now, of another in the next step:
+    it sank in."""
+    hill = '<hfield name="hill" nrow="11" ncol="11" size="3 3 .1 .1"/>'
+    box = free("box", ".013 .02 .3", 'type="box" size=".05 .04 .03"')
+    bodies = '<geom type="hfield" hfield="hill"/>' + box
+    made, data = world(bodies, more=f"<asset>{hill}</asset>", mu=0.5)
+    random = np.random.default_rng(seed)
+    data.qpos[3:] = random.normal(size=4)
+    data.qvel[:] = random.normal(size=6) * [0.5, 0.5, 0.5, 4, 4, 4]
+    Coulomb(made, rigid=True).step(data, 1500)
+    assert data.qpos[2] > 0.03 - 1e-6
+    assert np.abs(data.qvel).max() < 1e-6
+
+
 def test_what_hangs_below_the_floor_on_which_a_body_slides_stops_at_a_wall():
     """The wall lies below the contacts that bear the body, but not all of the body lies above."""
     high = '<geom type="box" size="2 .3 .1" pos="0 0 .8"/>'
