@@ -48,8 +48,10 @@ class Coulomb:
         True: Moreau and Jean's time stepping, in which contacts have no depth to speak of and land
         within one step. Geoms get a `margin` in which contacts are seen ahead, but bear nothing: at
         least the way of a step at the speed of a fall through the scene, or a fifth of their
-        radius. Margins are for steps up to the model's as it is now. While the law acts the
-        integrator is Euler's, and dampers are inertia of the same effect, which contacts know
+        radius; less where that reaches too many cells of a heightfield. Margins are for steps up
+        to the model's as it is now. Dry friction of joints and tendons is as stiff. While the law
+        acts the integrator is Euler's, and dampers are inertia of the same effect, which contacts
+        know
     restitution : share of its normal speed with which a rigid contact parts after an impact, 0 … 1;
         or one for each geom, of which two in contact have the larger, as MuJoCo mixes friction
     kinetic : friction of contacts that slide, in units of the friction that keeps them from it,

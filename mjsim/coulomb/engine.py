@@ -155,8 +155,8 @@ def _function(name: str, returns: Any = types.void, arguments: int = 2) -> Any:
 
 def _collider(name: str, one: int, other: int) -> Any:
     """What finds the points of two kinds of geoms, within a margin."""
-    row = ctypes.c_void_p * int(mujoco.mjtGeom.mjNGEOMTYPES)
-    address = (row * len(row())).in_dll(LIBRARY, "mjCOLLISIONFUNC")[one][other]
+    kinds = int(mujoco.mjtGeom.mjNGEOMTYPES)
+    address = (ctypes.c_void_p * kinds * kinds).in_dll(LIBRARY, "mjCOLLISIONFUNC")[one][other]
     arguments = *[types.intp] * 3, types.int32, types.int32, types.float64
     return c_function(name, address or 0, types.int32, *arguments)
 
