@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntFlag
-from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -38,11 +37,6 @@ def thresholds(p: Parameters) -> Thresholds:
 
     p.omega_0 plays no part. The law of drag shifts omega_04 and eta_cr only."""
     check_type("p", p, Parameters)
-    return _thresholds(p.replace(omega_0=0.0))
-
-
-@lru_cache(maxsize=1000)
-def _thresholds(p: Parameters) -> Thresholds:
     Omega = threshold_curves(p, p.mu, p.eta)
     unit = np.sqrt(p.g / p.R)
     eta_cr = float(Omega.pop("eta_cr"))

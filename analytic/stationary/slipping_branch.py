@@ -14,7 +14,6 @@ Functions take the place s, parameters, and mu and eta if not those of p: floats
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -152,24 +151,13 @@ def fold(
     return np.where(exists, places, np.nan)
 
 
-def fold_of(p: Parameters) -> float:
-    """The place s of the fold with the coefficients of p, nan if there is none, from a cache:
-    p.omega_0 plays no part."""
-    return _fold_of(p.replace(omega_0=0.0))
-
-
-@lru_cache(maxsize=1000)
-def _fold_of(p: Parameters) -> float:
-    return float(fold(p))
-
-
 def points_at(p: Parameters) -> list[float]:
     """Places s of the branch in the flow p.omega_0 > 0, in the order of |alpha|; [] if none.
 
     The branch rises with Omega_0 from RR to the fold, then falls: at most one of each part."""
     if not (p.mu > 0 and p.c > 0 and p.eta < p.j):
         return []
-    turning = fold_of(p)
+    turning = float(fold(p))
     parts = [(-END, END)] if np.isnan(turning) else [(-END, turning), (turning, END)]
 
     def excess(s: Array) -> Array:
