@@ -214,7 +214,9 @@ def dask(address: str) -> Workers:
     for name in ("distributed", "distributed.client", "tornado.application", "asyncio"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
-        client: Any = Client(address, timeout=SCHEDULER_TIMEOUT)  # type: ignore[no-untyped-call]
+        # not the default of whatever else asks Dask, who might go on asking it once it is gone
+        how: dict[str, Any] = {"timeout": SCHEDULER_TIMEOUT, "set_as_default": False}
+        client: Any = Client(address, **how)  # type: ignore[no-untyped-call]
     except (OSError, ValueError, TypeError) as error:
         raise InputError(f"no Dask scheduler answers at {address}: {error}") from error
     count = sum(client.nthreads().values())
