@@ -215,8 +215,9 @@ def dask(address: str) -> Workers:
         logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         # not the default of whatever else asks Dask, who might go on asking it once it is gone
-        how: dict[str, Any] = {"timeout": SCHEDULER_TIMEOUT, "set_as_default": False}
-        client: Any = Client(address, **how)  # type: ignore[no-untyped-call]
+        client: Any = Client(  # type: ignore[no-untyped-call]
+            address, timeout=SCHEDULER_TIMEOUT, set_as_default=False
+        )
     except (OSError, ValueError, TypeError) as error:
         raise InputError(f"no Dask scheduler answers at {address}: {error}") from error
     count = sum(client.nthreads().values())

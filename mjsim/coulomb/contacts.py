@@ -189,18 +189,25 @@ def find(model: Any, data: Any, memory: Any) -> None:
         contact = contacts[count]
         clear(contact)
         contact.index, contact.address, contact.dim = i, address, given.dim
-        contact.gap, contact.margin, contact.cone = given.dist, given.includemargin, given.mu
+        contact.margin, contact.cone = given.includemargin, given.mu
         contact.velocity[0] = math.inf
         for j in range(5):
             contact.mu[j] = given.friction[j]
-        for j in range(3):
-            contact.pos[j] = given.pos[j]
-        for j in range(9):
-            contact.frame[j // 3, j % 3] = given.frame[j]
+        read_place(contact, given)
         place_on_bodies(model, data, contact, given)
         count += 1
     memory.contacts, memory.rows, memory.ncon = count, data.nefc, data.ncon
     memory.first_dry, memory.dry = data.ne, data.nf
+
+
+@kernel
+def read_place(contact: Any, given: Any) -> None:
+    """Read gap, place and axes of a contact."""
+    contact.gap = given.dist
+    for j in range(3):
+        contact.pos[j] = given.pos[j]
+    for j in range(9):
+        contact.frame[j // 3, j % 3] = given.frame[j]
 
 
 @kernel

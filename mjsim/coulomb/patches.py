@@ -7,7 +7,7 @@ import math
 from typing import Any
 
 from .compiling import kernel
-from .contacts import SIZE, WORDS, copy, kinds, leave_out, same_geoms
+from .contacts import SIZE, WORDS, copy, kinds, leave_out, read_place, same_geoms
 from .engine import (
     BOX,
     CYLINDER,
@@ -83,12 +83,11 @@ def has_flat_faces(model: Any, geoms: Any) -> bool:
 
 @kernel
 def add_points_without_margin(model: Any, data: Any, memory: Any, like: Any) -> int:
-    """Add the points that two geoms have without margin; those of a pair like this contact."""
+    """Add the points that the geoms of a contact have without margin; return how many. The contact
+    stands for each of them meanwhile."""
     stride, added = POINT // 8, 0
-    points, radius = (
-        reals(memory.patch_at, MOST_POINTS * stride),
-        reals(model.geom_rbound, model.ngeom),
-    )
+    points = reals(memory.patch_at, MOST_POINTS * stride)
+    radius = reals(model.geom_rbound, model.ngeom)
     near = memory.law.near * max(radius[like.geoms[0]], radius[like.geoms[1]])
     count = mjc_Convex(
         memory.model, memory.data, memory.patch_at, like.geoms[0], like.geoms[1], 0.0
@@ -102,6 +101,7 @@ def add_points_without_margin(model: Any, data: Any, memory: Any, like: Any) -> 
             complete_frame(like.frame)
             add_point(data, memory, like)
             added += 1
+    read_place(like, engine_contacts(data.contact, data.ncon)[like.index])
     return added
 
 

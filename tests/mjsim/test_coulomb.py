@@ -800,6 +800,23 @@ def test_what_stands_on_many_corners_tips_over_none_of_them_too_early(rigid, geo
     assert data.body("body").xmat[8] > math.cos(math.radians(0.5))
 
 
+def test_contacts_keep_their_gaps_while_points_are_added():
+    """Two of them had that of another point, mm away, after which the collider had been asked."""
+    bodies = '<geom type="box" size="1 1 .1" pos="0 0 -.1"/>' + free(
+        "body", "0 0 .06", 'type="cylinder" size=".05 .05"', euler="3 2 0"
+    )
+    made, data = world(bodies, mu=2.0)
+    made.opt.gravity[:] = 7.0, 4.0, -9.81
+    law = Coulomb(made, rigid=True)
+    for _ in range(300):
+        with law.acting(data):
+            mujoco.mj_forward(made, data)
+            memory = law._simulation(data)
+            contacts = memory._array("contact")[: memory.record["contacts"][0]]
+            assert (contacts["gap"] == data.contact.dist[contacts["index"]]).all()
+        law.step(data)
+
+
 @WAYS
 def test_tendons_move_beside_what_rests(rigid):
     """A body without geoms swings on a tendon with dry friction while a box lies there: the

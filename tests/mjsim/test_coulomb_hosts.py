@@ -658,7 +658,10 @@ def test_two_packages_of_the_law_in_a_process(tmp_path):
     done = subprocess.run(
         [sys.executable, "-c", textwrap.dedent(slide)],
         env=os.environ | {"PYTHONPATH": f"{ROOT}{os.pathsep}{tmp_path}"},
-        **{"cwd": tmp_path, "capture_output": True, "text": True, "timeout": TIMEOUT},
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=TIMEOUT,
     )
     assert done.stdout.split() == ["True", "True"], done.stderr
 
