@@ -19,6 +19,7 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
@@ -127,10 +128,12 @@ class Campaign:
 
     def __exit__(self, kind: type[BaseException] | None, *error: object) -> None:
         self.fleet.close(at_once=kind is not None)
-        self._owned.release()  # first: it needs no handle of a file, and there may be none
+        self._owned.release()
+        if self._made:
+            with suppress(OSError):  # it holds something; to look would take a handle of a file
+                self.directory.rmdir()
+                return
         remove_leftovers(self.directory)
-        if self._made and not any(self.directory.iterdir()):
-            self.directory.rmdir()
 
     def part(self, label: str, doing: str) -> Campaign:
         """A part of the campaign with a label and runs of its own, for another thread."""

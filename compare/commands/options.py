@@ -280,23 +280,22 @@ def nothing_left(args: argparse.Namespace) -> Iterator[None]:
     output: Path | None = getattr(args, "output", None)
     new = [each for each in (output, *output.parents) if not each.exists()] if output else []
     filled = output is None or output.is_file() or (output.is_dir() and any(output.iterdir()))
-    try:
-        yield
-    except BaseException as error:
-        traceback.clear_frames(error.__traceback__)  # which may hold the last handles of files
-        inner = []
-        if output and not filled:
-            with suppress(OSError):  # a library holds all handles
-                inner = sorted(output.rglob("*"), reverse=True)
-        files = [each for each in inner if not each.is_dir()]
-        mistake = isinstance(error, OSError | InputError) and not args.resumes
-        if mistake or {each.name for each in files} <= NOTES:
-            for each in files:
-                each.unlink()
-        for each in [*inner, *new]:
-            with suppress(OSError):  # it holds something, or was never made
-                each.rmdir()
-        raise
+    with Path(os.devnull).open() as spare:  # a handle to look at the end with
+        try:
+            yield
+        except BaseException as error:
+            traceback.clear_frames(error.__traceback__)  # which may hold all other handles
+            spare.close()
+            inner = sorted(output.rglob("*"), reverse=True) if output and not filled else []
+            files = [each for each in inner if not each.is_dir()]
+            mistake = isinstance(error, OSError | InputError) and not args.resumes
+            if mistake or {each.name for each in files} <= NOTES:
+                for each in files:
+                    each.unlink()
+            for each in [*inner, *new]:
+                with suppress(OSError):  # it holds something, or was never made
+                    each.rmdir()
+            raise
 
 
 NARROWEST = 40
