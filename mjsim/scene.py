@@ -18,11 +18,6 @@ IMPRATIO = 300
 forces of balls that roll at both points were too rough for the onset of lifting, and it hung on
 round-off.)"""
 
-LS_TOLERANCE = 1e4
-"""Of rigid contacts, in units of the solver's tolerance, 1e-20: a line search ends at round-off. It
-went on to its last iteration where the ball rolls on the wall alone, for a third of the time of a
-step."""
-
 
 def spec(p: Parameters, settings: ContactModel) -> Any:
     """The scene as an `mujoco.MjSpec`."""
@@ -46,7 +41,7 @@ def spec(p: Parameters, settings: ContactModel) -> Any:
     if isinstance(settings, ContactSettings):
         _set_contacts(spec, settings)
     else:  # the law takes none of these
-        option.impratio, option.ls_tolerance = IMPRATIO, LS_TOLERANCE
+        option.impratio = IMPRATIO
     return spec
 
 
@@ -66,8 +61,8 @@ def _set_contacts(spec: Any, settings: ContactSettings) -> None:
 def build(p: Parameters, settings: ContactModel) -> tuple[Any, str]:
     """The scene compiled to an `mujoco.MjModel` of its own, and as the MJCF text that is simulated.
 
-    Textures are left out: they are 1.7 MB, take most of the time to build it, and no step looks at
-    them.
+    Light and textures are left out: no step looks at them, and textures are 1.7 MB and take most of
+    the time to build it.
 
     Raises `InputError` if MuJoCo refuses the parameters.
     """
@@ -81,8 +76,8 @@ def compiled(p: Parameters, settings: ContactModel) -> tuple[Any, str]:
     """As `build`, but from a cache: the model is shared. It is one for all omega_0: give none."""
     filled = spec(p, settings)
     try:
-        for texture in list(filled.textures):
-            filled.delete(texture)
+        for seen in (*filled.textures, *filled.lights):
+            filled.delete(seen)
         for material in filled.materials:
             material.textures = [""] * len(material.textures)
         text = str(filled.to_xml())

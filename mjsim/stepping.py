@@ -1,10 +1,10 @@
 """The ball on joints along the paper's coordinates, and the loop round MuJoCo's step.
 
-Before a step the wall is turned to be tangent at the ball's azimuth, and drag and inertia are
-those in its middle (`mjsim.mid_step`). All else is MuJoCo's: plain, or with rigid contacts under
-`mjsim.Coulomb`, the law for any model. Under that semi-implicit steps are leapfrog, places half a
-step ahead of velocities, and contacts are in sight long before they close, so that they need no
-depth. The ball's axes are left to turn: set upright, contacts would seem to be fixed on it.
+Before a step the ball is set back to azimuth zero, where the wall is tangent, and drag and inertia
+are those in its middle (`mjsim.mid_step`). All else is MuJoCo's: plain, or with rigid contacts
+under `mjsim.Coulomb`, the law for any model. Under that semi-implicit steps are leapfrog, places
+half a step ahead of velocities, and contacts are in sight long before they close, so that they need
+no depth. The ball's axes are left to turn: set upright, contacts would seem to be fixed on it.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ slip is slow, friction turns fast; the least change, in units of a fall in a ste
 steps. (Chosen after balls that hop had been seen.)"""
 SHARE = 1e-6
 """`share` of the law: part of gravity to which the slip of contacts must be predicted."""
-_NORMAL_A, _NORMAL_B = range(NSENSOR)[recorder.NORMALS]
+_NORMAL_A, _NORMAL_B = recorder.NORMALS
 _SLIP_A, _, _SLIP_B, _ = recorder.SLIPS
 
 
@@ -47,8 +47,8 @@ class Joints(NamedTuple):
     qvel: Any
     applied: Any
     sensors: Any
-    tangent: Any
-    """Quaternion of floor and wall."""
+    azimuth: Any
+    """How far it was set back, rad, an array of one."""
     margins: Any
     """Gaps at which contacts are in sight, m."""
     last: Any
@@ -119,8 +119,9 @@ def take_step(body: Joints, step: float, omega_0: float) -> None:
     """Take a step of so many seconds."""
     qpos, applied, last, v = body.qpos, body.applied, body.last, velocity_of(body)
     stop_landing(body)
+    body.azimuth[0] += qpos[0]
+    qpos[0] = 0.0
     before = Velocity(last[0], last[1], last[2], last[3], last[4], last[5])
-    body.tangent[0], body.tangent[3] = math.cos(qpos[0] / 2), math.sin(qpos[0] / 2)
     rho = body.ball.R - float(qpos[1])
     force = mid_step_forces(v, before, rho, omega_0, body.ahead, step, body.ball)
     x, y, z = spin_axes(qpos[3:])
@@ -174,6 +175,7 @@ def advance(body: Joints, fluid: Array, rows: Array) -> None:
         row, v, count = rows[done], velocity_of(body), parts(body)
         for i in range(COORDINATES):
             row[i] = body.qpos[i]
+        row[0] += body.azimuth[0]
         for i in range(6):
             row[COORDINATES + i] = v[i]
         if count > _MOST:
@@ -230,7 +232,7 @@ class JointedBall:
             qvel=data.qvel,
             applied=data.qfrc_applied,
             sensors=data.sensordata,
-            tangent=data.mocap_quat[0],
+            azimuth=np.zeros(1),
             margins=model.pair_margin,
             last=np.zeros(6),
             slips=np.zeros((2, 2)),
@@ -248,10 +250,10 @@ class JointedBall:
         mujoco.mj_resetData(self.model, self.data)
         if self.law:
             self.law.reset()
-        place, v = recorder.joint_state(x, theta_0, self.p)
+        place, v = recorder.joint_state(x, self.p)
         body = self.body
         body.qpos[:3], body.qvel[:], body.last[:] = place + self.lead * v[:3], v, v
-        body.slips[:], body.landed[:] = 0.0, 0
+        body.azimuth[:], body.slips[:], body.landed[:] = theta_0, 0.0, 0
 
     def acting(self) -> AbstractContextManager[None]:
         """Within this the engine's own steps obey the law, if there is one."""

@@ -100,12 +100,14 @@ class StepSeries:
 def zero_step_limit(series: StepSeries, ends: Ends = frozenset()) -> Limit | None:
     """A check extrapolated to a zero time step; None where it has no limit.
 
-    What is counted, or unknown to theory, has none but what the finest step says."""
+    What is counted, or unknown to theory, has none but what the finest step says, of two or more
+    that can be measured. (Cases of one step counted until chance decided that of a ball that
+    chatters.)"""
     m, scale, n = series.last.measurement, series.last.scale or 1.0, len(series.checks)
     required, is_threshold = quantity(m.quantity).resolution, quantity(m.quantity).threshold
     if _next_to_threshold(m, ends):
         return None
-    if required == 0 or (math.isnan(series.last.predicted) and n >= LEAST_STEPS):
+    if (required == 0 and n > 1) or (math.isnan(series.last.predicted) and n >= LEAST_STEPS):
         return series.last, math.nan
     errors = series.errors
     if n < LEAST_STEPS or not np.all(np.isfinite(errors)):

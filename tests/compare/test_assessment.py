@@ -18,7 +18,7 @@ from compare.verification.convergence import (
     extrapolated,
     zero_step_limit,
 )
-from model import Parameters
+from model import Case, Parameters
 from tests.measured import claim, measured
 
 P = Parameters.named("reference")
@@ -130,6 +130,15 @@ def test_brackets_of_thresholds_hide_what_changes_with_the_step(errors, agrees):
     checks = tuple(Check(measurement=place, **known) for place in places)
     limit = zero_step_limit(StepSeries((2, 3, 4), checks))
     assert (limit and limit[0].agrees) is agrees
+
+
+@pytest.mark.parametrize(("steps", "counts"), [(1, False), (2, True)])
+def test_a_case_counts_where_two_steps_have_it(steps, counts):
+    """Of a ball that chatters chance decides whether one step has any."""
+    case = measured("settled", "case", float(Case.SS), 0.0)
+    check = Check(measurement=case, predicted=float(Case.SS), uncertainty=0.0, scale=1.0)
+    series = StepSeries(tuple(range(4 - steps, 4)), (check,) * steps)
+    assert (zero_step_limit(series) is not None) is counts
 
 
 def test_other_states_are_not_aligned_and_two_steps_are_not_enough():

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 import mjsim
-from mjsim import ContactSettings, RigidContacts, scene
-from model import Case, Flow, Parameters, SimulationError, Trajectory
+from mjsim import ContactSettings, RigidContacts, recorder, scene
+from mjsim.stepping import JointedBall
+from model import Case, Flow, Parameters, SimulationError, State, Trajectory
+from model.kinematics import frame
 from model.trajectory import columns
 
 P = Parameters.named("reference")
@@ -149,6 +151,17 @@ def test_how_a_ball_slides_round_on_its_pole_does_not_depend_on_the_step() -> No
         assert run.cases[-1] is Case.SS
         ends.append([run.omega_c[last].mean(), run.slip_z[last].mean()])
     np.testing.assert_allclose(*ends, rtol=1e-7)
+
+
+@pytest.mark.parametrize("settings", [RigidContacts(), SOFT], ids=["rigid", "soft"])
+def test_contacts_have_the_axes_in_which_forces_are_read(settings) -> None:
+    ball = JointedBall(scene.build(P, settings)[0], P, settings)
+    ball.start(State.one([0, 0, 12.0, -2, 1, 6]), 2.0)
+    ball.advance(np.full(20, 20.0), np.empty((20, recorder.COLUMNS)))
+    assert ball.body.azimuth > 2.1
+    for contact, axes in zip(ball.data.contact, recorder.FRAMES.values(), strict=True):
+        given = contact.frame.reshape(3, 3) @ frame(0.0).T
+        np.testing.assert_allclose(given, axes, rtol=0, atol=1e-15)
 
 
 def test_file_opens_as_it_is_and_holds_the_reference() -> None:
