@@ -17,7 +17,7 @@ import numpy.typing as npt
 from .callback import CALLBACK, finish
 from .engine import MARGINS_ADD_UP
 from .memory import Simulation, check_state, sizes
-from .parameters import CCD_TOLERANCE, EARTH, Law
+from .parameters import CCD_TOLERANCE, EARTH, FORCE_TOLERANCE, Law
 
 _RK4, _EULER = int(mujoco.mjtIntegrator.mjINT_RK4), int(mujoco.mjtIntegrator.mjINT_EULER)
 _INTEGRATORS = {
@@ -351,7 +351,8 @@ class Coulomb:
         """
         option = self.model.opt
         cone, integrator, flags = option.cone, option.integrator, option.disableflags
-        accuracy, solver, braking = option.ccd_tolerance, option.solver, False
+        accuracy, tolerance, solver = option.ccd_tolerance, option.tolerance, option.solver
+        braking = False
         option.cone = _ELLIPTIC
         # from no force PGS only tries a normal one, which De Saxcé's shift keeps at none
         option.solver = _NEWTON if solver == _PGS else solver
@@ -360,10 +361,11 @@ class Coulomb:
             option.integrator, option.disableflags = _EULER, flags | _NO_DAMPING
             # what lies on a smooth side rolls off if its point is a micrometre beside it
             option.ccd_tolerance = min(accuracy, CCD_TOLERANCE)
+            option.tolerance *= FORCE_TOLERANCE
 
         def back() -> None:
             option.cone, option.integrator, option.disableflags = cone, integrator, flags
-            option.ccd_tolerance, option.solver = accuracy, solver
+            option.ccd_tolerance, option.tolerance, option.solver = accuracy, tolerance, solver
 
         return braking, back
 

@@ -769,6 +769,22 @@ def test_what_lies_on_its_smooth_side_stays(shape, place):
     assert made.opt.ccd_tolerance == 1e-6
 
 
+def test_where_rigid_forces_are_predicted_the_solver_has_nothing_to_do():
+    """What slides down a slope goes as Coulomb's law says, to round-off all the same."""
+    made, data = scene(slope=20, mu=0.25)
+    coulomb = Coulomb(made, rigid=True)
+    coulomb.step(data, 500)
+    before, idle = data.qvel[0], 0
+    for _ in range(100):
+        coulomb.step(data)
+        idle += data.solver_niter[0] == 0
+    assert idle > 50
+    angle = math.radians(20)
+    gained = 9.81 * (math.sin(angle) - 0.25 * math.cos(angle)) * 100 * made.opt.timestep
+    assert data.qvel[0] - before == pytest.approx(gained, rel=1e-10)
+    assert made.opt.tolerance == 1e-8
+
+
 def test_dry_joints_stop_as_suddenly_as_rigid_contacts():
     """After J w^2/(2 M), to half a step's way. In plain MuJoCo what is slower than M/J times the
     joint's time constant dies out: it would go 2.4 times as far."""
