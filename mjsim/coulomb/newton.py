@@ -130,27 +130,44 @@ def find_residual(model: Any, data: Any, memory: Any, a: Any) -> float:
 @kernel
 def subtract_forces(memory: Any, rows: Any, u: int, a: Any, residual: Any) -> None:
     """Find the forces of a unit at accelerations `a`, and take J' f off the residual."""
-    unit, place, jacobian = rows[u], places_of(memory, rows[u]), jacobians_of(memory, rows[u])
-    force = reals(memory.local_at, unit.dim)
-    for r in range(unit.dim):
-        row, acceleration = rows[u + r], 0.0
-        for n in range(len(place)):
-            acceleration += jacobian[r, n] * a[place[n]]
-        row.residual = acceleration - row.reference - row.R * row.held
-        if unit.contact >= 0 and unit.residual >= 0:
-            break  # it is open, and what else there is of it tells nothing
+    unit = rows[u]
+    find_residuals_of(memory, rows, u, 0, 1, a)
     if unit.contact < 0:
         unit.force = row_force(unit)
     else:
+        if unit.residual < 0:  # else it is open, and what else there is of it tells nothing
+            find_residuals_of(memory, rows, u, 1, unit.dim, a)
         contact = contacts_of(memory)[unit.contact]
         contact.state = contact_forces(rows, contact)
     if unit.force == 0:
         return
-    for r in range(unit.dim):
+    if unit.dim == 3:  # loops of a length that is known are faster
+        subtract_unit(memory, rows, u, 3, residual)
+    else:
+        subtract_unit(memory, rows, u, unit.dim, residual)
+
+
+@kernel
+def find_residuals_of(memory: Any, rows: Any, u: int, first: int, after: int, a: Any) -> None:
+    """Set the residuals of some rows of a unit, at accelerations `a`."""
+    place, jacobian = places_of(memory, rows[u]), jacobians_of(memory, rows[u])
+    for r in range(first, after):
+        row, acceleration = rows[u + r], 0.0
+        for n in range(len(place)):
+            acceleration += jacobian[r, n] * a[np.uint64(place[n])]
+        row.residual = acceleration - row.reference - row.R * row.held
+
+
+@kernel
+def subtract_unit(memory: Any, rows: Any, u: int, dim: int, residual: Any) -> None:
+    """Take J' f of a unit off the residual."""
+    place, jacobian = places_of(memory, rows[u]), jacobians_of(memory, rows[u])
+    force = reals(memory.local_at, dim)
+    for r in range(dim):
         force[r] = rows[u + r].force
     for n in range(len(place)):
         whole = 0.0
-        for r in range(unit.dim):
+        for r in range(dim):
             whole += jacobian[r, n] * force[r]
         residual[np.uint64(place[n])] -= whole
 
@@ -172,7 +189,7 @@ def assemble(model: Any, data: Any, memory: Any, matrix: Any) -> None:
     for u in units_of(memory):
         if rows[u].force != 0:
             find_stiffness(rows, contacts, u)
-            if rows[u].dim == 3:  # loops of a length that is known are faster
+            if rows[u].dim == 3:
                 add_unit(memory, rows, u, 3, matrix)
             else:
                 add_unit(memory, rows, u, rows[u].dim, matrix)
