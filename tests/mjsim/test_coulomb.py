@@ -235,6 +235,19 @@ def test_what_lands_on_a_coarse_heightfield_comes_to_rest(seed):
     assert np.abs(data.qvel).max() < 1e-6
 
 
+@WAYS
+@pytest.mark.parametrize(("y", "tilt"), [(0.2, -5), (0.1, 20)])
+def test_what_lands_across_the_rim_of_a_box_bears_on_it(rigid, y, tilt):
+    """Its contacts with a face and the rim have different normals, and the rim is no inner edge.
+    In plain MuJoCo it comes 10.6 mm deep."""
+    capsule = free("capsule", f"0 {y} .3", 'type="capsule" size=".05 .1"', euler=f"{90 + tilt} 0 0")
+    made, data = world('<geom type="box" size=".2 .2 .1"/>' + capsule)
+    coulomb = Coulomb(made, rigid=rigid)
+    for _ in range(150):
+        coulomb.step(data)
+        assert data.contact.dist.min(initial=0.0) > -0.012
+
+
 def test_what_hangs_below_the_floor_on_which_a_body_slides_stops_at_a_wall():
     """The wall lies below the contacts that bear the body, but not all of the body lies above."""
     high = '<geom type="box" size="2 .3 .1" pos="0 0 .8"/>'
