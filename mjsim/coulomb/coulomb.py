@@ -482,6 +482,8 @@ def _see_ahead(model: Any) -> None:
     moves = model.body_weldid[model.geom_bodyid] > 0  # what is at rest has that of the smallest
     own = np.where(moves, own, own.min(where=moves & (most > 0), initial=ahead))
     np.maximum(model.geom_margin, own / 2 if MARGINS_ADD_UP else own, out=model.geom_margin)
+    # bodies of several geoms are compared by their own margins first
+    np.maximum.at(model.body_margin, model.geom_bodyid, model.geom_margin)
     pairs = np.array([model.pair_geom1, model.pair_geom2])
     np.maximum(model.pair_margin, own[pairs].max(axis=0), out=model.pair_margin)
     if model.opt.enableflags & _OVERRIDE:  # one margin for all contacts

@@ -917,6 +917,15 @@ def test_what_lands_without_gravity_or_with_one_margin_for_all_is_seen_ahead(fla
     assert np.abs(data.qvel).max() < 1e-6
 
 
+def test_what_lands_on_one_of_several_geoms_of_a_body_is_seen_ahead():
+    """MuJoCo first compares such bodies by margins of their own."""
+    made, data = world(FLOOR + '<geom type="box" size=".3 .3 .1"/>' + free("box", "0 0 .3", BOX))
+    law = Coulomb(made, rigid=True)
+    for _ in range(200):
+        law.step(data)
+        assert data.qpos[2] > 0.15 - 1e-5
+
+
 def balls(*places, radius=0.03, geom='friction="0"'):
     """Balls of the same kind on a floor."""
     geom = f'size="{radius}" mass=".17" {geom}'
