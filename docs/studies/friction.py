@@ -353,7 +353,7 @@ def numbers(rigid: bool = False, **law: Any) -> Way:
 
 
 LAWS = {
-    "**soft**: slip predicted to a twentieth of gravity": numbers(),
+    "**soft**: slip predicted to a fiftieth of gravity": numbers(),
     "to a hundredth": numbers(share=0.01),
     "predicted, never solved for": numbers(most=0),
     "at most 5 solutions": numbers(most=5),

@@ -22,7 +22,7 @@ class Law:
     """Friction of contacts that slide, in units of what keeps them from it."""
     servo: float = 0.0
     """Baumgarte stabilisation: time in which soft contacts lose their depth, s; 0: never."""
-    share: float = 5e-2
+    share: float = 2e-2
     """Share of gravity to which the slip of contacts, and what rigid ones bear, must be
     predicted."""
     most: int = 20
@@ -121,7 +121,7 @@ NEAR = 0.02
 FALLING = 0.1
 """Part to which what they give way must fall by a solution for another one to be tried, when it is
 little enough."""
-FEEDBACK, STEADIER = 0.5, 1e-2
+FEEDBACK, STEADIER = 0.5, 2.5e-2
 """`friction.feedback` beyond which errors of predicted slip grow from step to step; part of `share`
 to which it must be known there. Velocities of a ball that slides in a corner are then off by up to
 5e-4 m/s or rad/s, with 1 by 3e-2."""

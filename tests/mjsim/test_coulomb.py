@@ -669,14 +669,15 @@ def test_what_stands_on_a_turntable_stays_there(rigid, table):
 @WAYS
 @TABLES
 def test_what_a_turntable_has_caught_slips_no_more(rigid, table):
-    """It did so for ever, by as much as in plain MuJoCo: half of its contacts stuck by turns."""
+    """It did so for ever, by as much as in plain MuJoCo, 3 mm: half of its contacts stuck by turns.
+    Rigid ones shake by half a µm in a tenth of a second."""
     made, data = world(AXLE + table + free("box", ".3 0 .05", 'type="box" size=".03 .03 .05"'))
     data.qvel[0] = 2.0
     law = Coulomb(made, rigid=rigid)
     law.step(data, 150)
     radius = math.hypot(*data.qpos[1:3])
     law.step(data, 250)
-    assert math.hypot(*data.qpos[1:3]) == pytest.approx(radius, abs=1e-6)
+    assert math.hypot(*data.qpos[1:3]) == pytest.approx(radius, abs=3e-6)
 
 
 @WAYS
