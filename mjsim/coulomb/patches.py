@@ -7,7 +7,16 @@ import math
 from typing import Any
 
 from .compiling import kernel
-from .contacts import SIZE, WORDS, copy, kinds, leave_out, read_place, same_geoms
+from .contacts import (
+    SIZE,
+    WORDS,
+    copy,
+    kinds,
+    leave_out,
+    read_place,
+    same_geoms,
+    smaller_radius,
+)
 from .engine import (
     BOX,
     CYLINDER,
@@ -24,7 +33,7 @@ from .engine import (
     reals,
 )
 from .memory import NEW, contacts_at, contacts_of
-from .parameters import AT_MOST, CORNER, UNMOVED
+from .parameters import AT_MOST, CORNER, FARTHEST, UNMOVED
 from .rigid import depth_kept
 
 
@@ -39,7 +48,8 @@ def put_points_back(model: Any, data: Any, memory: Any) -> bool:
     for i in range(len(before)):
         old = before[i]
         near = memory.law.near * max(radius[old.geoms[0]], radius[old.geoms[1]])
-        if not 1.99 * near**2 < old.moved < math.inf:
+        far = FARTHEST * smaller_radius(model, old.geoms)
+        if not 1.99 * far**2 < old.moved < math.inf:  # what is nearer has rolled
             continue
         place_lost_point(model, data, old)
         if old.gap >= 0 or old.moved >= (near / 10) ** 2 or not is_lost(data, memory, old, near):

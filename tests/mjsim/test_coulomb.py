@@ -783,6 +783,19 @@ def test_what_lies_on_its_smooth_side_stays(shape, place):
     assert made.opt.ccd_tolerance == 1e-6
 
 
+@WAYS
+def test_what_rolls_fast_has_no_more_points_than_the_collider_finds(rigid):
+    """It left the last step's point behind, as if that were the corner of a face."""
+    round_ones = 'type="sphere" size=".05"', 'type="ellipsoid" size=".05 .08 .05"'
+    bodies = [free(f"b{k}", f"0 {k} .05", each) for k, each in enumerate(round_ones)]
+    bodies.append(free("c", "0 3 .05", 'type="cylinder" size=".05 .1"', euler="90 0 0"))
+    made, data = world(FLOOR + "".join(bodies), mu=0.6)
+    data.qvel[::6], data.qvel[4::6] = 1.0, 20.0
+    law = Coulomb(made, rigid=rigid)
+    law.step(data, 100)
+    assert data.ncon == 4
+
+
 def test_where_rigid_forces_are_predicted_the_solver_has_nothing_to_do():
     """What slides down a slope goes as Coulomb's law says, to round-off all the same."""
     made, data = scene(slope=20, mu=0.25)
