@@ -17,7 +17,7 @@ import numpy.typing as npt
 from .callback import CALLBACK, finish
 from .engine import MARGINS_ADD_UP
 from .memory import Simulation, check_state, sizes
-from .parameters import CCD_TOLERANCE, EARTH, FORCE_TOLERANCE, Law
+from .parameters import CCD_TOLERANCE, DOFS, EARTH, Law
 
 _RK4, _EULER = int(mujoco.mjtIntegrator.mjINT_RK4), int(mujoco.mjtIntegrator.mjINT_EULER)
 _INTEGRATORS = {
@@ -361,7 +361,7 @@ class Coulomb:
             option.integrator, option.disableflags = _EULER, flags | _NO_DAMPING
             # what lies on a smooth side rolls off if its point is a micrometre beside it
             option.ccd_tolerance = min(accuracy, CCD_TOLERANCE)
-            option.tolerance *= FORCE_TOLERANCE
+            option.tolerance *= max(DOFS / max(self.model.nv, 1), 1.0)
 
         def back() -> None:
             option.cone, option.integrator, option.disableflags = cone, integrator, flags
