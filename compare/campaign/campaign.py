@@ -129,11 +129,12 @@ class Campaign:
     def __exit__(self, kind: type[BaseException] | None, *error: object) -> None:
         self.fleet.close(at_once=kind is not None)
         self._owned.release()
-        if self._made:
-            with suppress(OSError):  # it holds something; to look would take a handle of a file
-                self.directory.rmdir()
-                return
-        remove_leftovers(self.directory)
+        try:
+            remove_leftovers(self.directory)
+        finally:  # also without a handle to look with
+            if self._made:
+                with suppress(OSError):  # it holds something
+                    self.directory.rmdir()
 
     def part(self, label: str, doing: str) -> Campaign:
         """A part of the campaign with a label and runs of its own, for another thread."""

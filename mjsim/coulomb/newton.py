@@ -131,12 +131,12 @@ def find_residual(model: Any, data: Any, memory: Any, a: Any) -> float:
 def subtract_forces(memory: Any, rows: Any, u: int, a: Any, residual: Any) -> None:
     """Find the forces of a unit at accelerations `a`, and take J' f off the residual."""
     unit = rows[u]
-    find_residuals_of(memory, rows, u, 0, 1, a)
+    find_unit_residuals(memory, rows, u, 0, 1, a)
     if unit.contact < 0:
         unit.force = row_force(unit)
     else:
         if unit.residual < 0:  # else it is open, and what else there is of it tells nothing
-            find_residuals_of(memory, rows, u, 1, unit.dim, a)
+            find_unit_residuals(memory, rows, u, 1, unit.dim, a)
         contact = contacts_of(memory)[unit.contact]
         contact.state = contact_forces(rows, contact)
     if unit.force == 0:
@@ -148,7 +148,7 @@ def subtract_forces(memory: Any, rows: Any, u: int, a: Any, residual: Any) -> No
 
 
 @kernel
-def find_residuals_of(memory: Any, rows: Any, u: int, first: int, after: int, a: Any) -> None:
+def find_unit_residuals(memory: Any, rows: Any, u: int, first: int, after: int, a: Any) -> None:
     """Set the residuals of some rows of a unit, at accelerations `a`."""
     place, jacobian = places_of(memory, rows[u]), jacobians_of(memory, rows[u])
     for r in range(first, after):
