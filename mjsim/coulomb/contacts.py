@@ -77,11 +77,8 @@ def hops(model: Any, geoms: Any) -> bool:
 
 @kernel
 def cosine(one: Any, other: Any) -> float:
-    """The cosine of the angle between the normals of two contacts."""
-    product = 0.0
-    for j in range(3):
-        product += one.frame[0, j] * other.frame[0, j]
-    return product
+    """The cosine of the angle between two normals."""
+    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
 
 
 @kernel

@@ -82,6 +82,8 @@ FLUSH = 1e-3
 faces shift."""
 ALIGNED = 1e-3
 """By how much the cosine of the angle between normals of one face is less than 1, at most."""
+ACROSS = 0.7
+"""The cosine between a normal and that of a face below which a point isn't one of that face."""
 EDGE = 1e-3
 """How high above a floor the edge of one of its pieces may stand, in units of the smaller radius,
 for what slides not to stop there."""

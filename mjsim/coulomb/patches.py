@@ -11,6 +11,7 @@ from .contacts import (
     SIZE,
     WORDS,
     copy,
+    cosine,
     kinds,
     leave_out,
     read_place,
@@ -33,7 +34,7 @@ from .engine import (
     reals,
 )
 from .memory import NEW, contacts_at, contacts_of
-from .parameters import AT_MOST, CORNER, FARTHEST, UNMOVED
+from .parameters import ACROSS, AT_MOST, CORNER, FARTHEST, UNMOVED
 from .rigid import depth_kept
 
 
@@ -174,15 +175,20 @@ def place_lost_point(model: Any, data: Any, old: Any) -> None:
 
 @kernel
 def is_lost(data: Any, memory: Any, old: Any, near: float) -> bool:
-    """Whether the collider has no more points of this pair of geoms than before, and none near this
-    one: of the corners of a polygon, and of a heightfield, it takes some by turns."""
+    """Whether the collider has no more points of these two faces than before, and none near this
+    one: of the corners of a polygon, and of a heightfield, it takes some by turns.
+
+    Points whose normals lie across are those of inner walls of a heightfield, which come and go.
+    """
     before = contacts_at(memory.before_at, memory.contacts_before)
     found = engine_contacts(data.contact, data.ncon)
     had, left = 0, 0
     for i in range(len(before)):
-        had += same_geoms(before[i].geoms, old.geoms)
+        across = cosine(before[i].frame[0], old.frame[0]) < ACROSS
+        had += same_geoms(before[i].geoms, old.geoms) and not across
     for i in range(data.ncon):
-        if same_geoms(found[i].geom, old.geoms):
+        across = cosine(found[i].frame, old.frame[0]) < ACROSS
+        if same_geoms(found[i].geom, old.geoms) and not across:
             left, old.index = left + 1, i
     return bool(0 < left <= had and not has_near(data, old, near))
 

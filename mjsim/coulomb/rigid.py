@@ -151,8 +151,9 @@ def slides_on(model: Any, memory: Any, contact: Any) -> bool:
 def same_face(model: Any, one: Any, other: Any) -> bool:
     """Whether two contacts are of the same bodies, with the same normal."""
     bodies = integers(model.geom_bodyid, model.ngeom)
-    same = bodies[one.geoms[0]] == bodies[other.geoms[0]] and cosine(one, other) > 1 - ALIGNED
-    return bool(same and bodies[one.geoms[1]] == bodies[other.geoms[1]])
+    same = bodies[one.geoms[0]] == bodies[other.geoms[0]]
+    same = same and bodies[one.geoms[1]] == bodies[other.geoms[1]]
+    return bool(same and cosine(one.frame[0], other.frame[0]) > 1 - ALIGNED)
 
 
 @kernel

@@ -219,10 +219,10 @@ def test_a_finely_meshed_heightfield_holds_what_covers_many_of_its_cells(geom):
     assert data.qpos[2] == pytest.approx(0.05, abs=1e-4)
 
 
-@pytest.mark.parametrize("seed", [6, 12, 19])
+@pytest.mark.parametrize("seed", [6, 12, 18, 39, 51, 174])
 def test_what_lands_on_a_coarse_heightfield_comes_to_rest(seed):
-    """On a cell the collider has one point of it, of one corner now, of another in the next step:
-    it sank in."""
+    """On a cell the collider has one point of it, of one corner now, of another in the next step,
+    beside some of inner walls: it sank in, shook for ever, or fell through."""
     hill = '<hfield name="hill" nrow="11" ncol="11" size="3 3 .1 .1"/>'
     box = free("box", ".013 .02 .3", 'type="box" size=".05 .04 .03"')
     bodies = '<geom type="hfield" hfield="hill"/>' + box
