@@ -78,7 +78,7 @@ def hops(model: Any, geoms: Any) -> bool:
 @kernel
 def cosine(one: Any, other: Any) -> float:
     """The cosine of the angle between two normals."""
-    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
+    return float(one[0] * other[0] + one[1] * other[1] + one[2] * other[2])
 
 
 @kernel

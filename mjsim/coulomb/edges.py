@@ -87,7 +87,8 @@ def piece_of(model: Any, contact: Any) -> int:
 def lies_below(model: Any, data: Any, edge: Any, floor: Any) -> bool:
     """Whether the piece to which an edge belongs lies below a contact of the same moving geom with
     another piece, with another normal. What rolls over the rim of a piece needs both contacts."""
-    if abs(cosine(edge.frame[0], floor.frame[0])) >= 1 - ALIGNED or same_geoms(edge.geoms, floor.geoms):
+    parallel = abs(cosine(edge.frame[0], floor.frame[0])) >= 1 - ALIGNED
+    if parallel or same_geoms(edge.geoms, floor.geoms):
         return False
     if edge.geoms[1 - edge.piece] != floor.geoms[1 - floor.piece]:
         return False

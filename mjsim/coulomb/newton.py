@@ -323,8 +323,9 @@ def hold_forces(memory: Any) -> float:
 
 
 @kernel
-def solve_contacts(model: Any, data: Any, memory: Any, a: Any) -> bool:
-    """Solve for the accelerations `a` with contacts that close, until none closes that was open.
+def solve_contacts(model: Any, data: Any, memory: Any, a: Any, scale: float) -> bool:
+    """Solve for the accelerations `a` with contacts that close, until none closes that was open;
+    `scale` of R is where each island begins.
 
     Slip that is predicted, and forces that are held, are those that it comes to. Returns whether it
     came to an end.
@@ -335,7 +336,7 @@ def solve_contacts(model: Any, data: Any, memory: Any, a: Any) -> bool:
         contact, normal = contacts[k], rows[contacts[k].address]
         contact.state = STICKS if normal.residual < 0 or normal.held > 0 else OPEN
     for n in range(memory.law.most):
-        if not solve_closed(model, data, memory, a, n == 0):
+        if not solve_closed(model, data, memory, a, n == 0, scale):
             return False
         find_residuals(memory, a)
         some = False
@@ -362,7 +363,9 @@ def find_residuals(memory: Any, a: Any) -> None:
 
 
 @kernel
-def solve_closed(model: Any, data: Any, memory: Any, a: Any, everywhere: bool) -> bool:
+def solve_closed(
+    model: Any, data: Any, memory: Any, a: Any, everywhere: bool, scale: float
+) -> bool:
     """Solve for the accelerations of islands of closed contacts, `everywhere` or where one has just
     closed; whether all came to an end."""
     find_units(memory)
@@ -373,20 +376,22 @@ def solve_closed(model: Any, data: Any, memory: Any, a: Any, everywhere: bool) -
             number_island(model, memory, first)
             for k in range(memory.size):
                 own[k] = a[dofs[k].dof]
-            solved = solve_rigid_island(model, data, memory)
+            solved = solve_rigid_island(model, data, memory, scale)
             for k in range(memory.size):
                 a[dofs[k].dof] = own[k]
     return solved
 
 
 @kernel
-def solve_rigid_island(model: Any, data: Any, memory: Any) -> bool:
+def solve_rigid_island(model: Any, data: Any, memory: Any, scale: float) -> bool:
     """Solve an island until R makes its contacts give way no more, m s-2: proximal point method.
 
-    R falls from solution to solution, so that they come near sooner (Rockafellar 1976); it grows
-    where Newton's method comes to no end. Then it is again what it was.
+    R, first `scale` times what it is, falls from solution to solution, so that they come near
+    sooner (Rockafellar 1976); it grows where Newton's method comes to no end. Then it is again what
+    it was.
     """
-    gives_way, last, scale, solved, least = math.inf, math.inf, 1.0, True, False
+    gives_way, last, solved, least = math.inf, math.inf, True, False
+    multiply_R(memory, scale)
     for _ in range(memory.law.most):
         if least and solved and gives_way <= memory.enough and gives_way >= FALLING * last:
             break

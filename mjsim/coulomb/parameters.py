@@ -104,18 +104,18 @@ STEPS = 20
 """Factorisations that Newton's method may take for an island with one R."""
 EXACT, ROUGH = 1e-9, 1e-6
 """Part of the forces without contacts to which it solves with the least R, and with others. What is
-rougher changes how contacts share a load that they can bear in many ways: 3e-2 by half a per
-cent of a weight."""
+rougher changes how contacts share a load that they can bear in many ways: 1e-4 moves the speed at
+which a wall alone lifts a ball by 1e-4 of it."""
 BLOCK = 4
 """Rows that are eliminated from another one at once, in `newton.subtract_block`, which is written
 for four."""
 FEWER, DECREASE, SHORTEST = 0.5, 1e-4, 1e-3
 """By what a Newton step is shortened; by how much, relative to its length, the residual must fall;
 the shortest."""
-SOFTER = 32.0
+SOFTER = 128.0
 """How much larger R is in a step that Newton's method solves, which holds forces until contacts
 give way no more."""
-R_RISES, R_FALLS, R_LEAST = 4.0, 0.5, 2.0**-5
+R_RISES, R_FALLS, R_LEAST = 4.0, 0.5, 2.0**-9
 """Factors of an island's R: where Newton's method comes to no end; after a solution; and all of
 them together at least. Powers of two, which are undone exactly."""
 NEAR = 0.02

@@ -28,7 +28,7 @@ from .friction import (
 )
 from .memory import CONTACT_ROW, DRY, contacts_of, memories, rows_of
 from .newton import solve_contacts
-from .parameters import EARTH, NEXT, OVER, SOFTER
+from .parameters import EARTH, NEXT, OVER, R_LEAST, SOFTER
 from .patches import add_points_below, leave_added_points_out, put_points_back
 from .rigid import (
     add_dampers,
@@ -244,11 +244,11 @@ def solve_rigid(model: Any, data: Any, memory: Any, start: Any) -> bool:
     """Find slip and forces by Newton's method; friction at mid step asks for a solution more, once
     it is known what slips."""
     soften(memory)
-    solved = solve_contacts(model, data, memory, start)
+    solved = solve_contacts(model, data, memory, start, 1.0)
     multiply(memory, start)
     subtract_references(memory)
     if oppose_slip_at_mid_step(model, data, memory):
-        solved &= solve_contacts(model, data, memory, start)
+        solved &= solve_contacts(model, data, memory, start, R_LEAST)
     extrapolate_slip(model, data, memory)
     return bool(solved)
 
