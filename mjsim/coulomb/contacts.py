@@ -38,7 +38,7 @@ from .memory import (
     pairs_at,
     rows_of,
 )
-from .parameters import ALIKE, APART, FARTHEST, FLUSH, STILL, UNMOVED
+from .parameters import ACROSS, ALIKE, APART, FARTHEST, FLUSH, STILL, UNMOVED
 
 SIZE = MJ_CONTACT.itemsize
 WORDS = SIZE // 8
@@ -312,8 +312,9 @@ def find_kinds(data: Any, memory: Any) -> None:
 
 @kernel
 def square_apart(one: Any, other: Any) -> float:
-    """Square of how far apart two contacts are on their bodies, m2; infinite for other geoms."""
-    if not same_geoms(one.geoms, other.geoms):
+    """Square of how far apart two contacts are on their bodies, m2; infinite for other geoms, and
+    for other faces of them: an inner wall of a heightfield mustn't inherit what its cells bear."""
+    if not same_geoms(one.geoms, other.geoms) or cosine(one.normal, other.normal) < ACROSS:
         return math.inf
     return float(square_way(one, other, 0) + square_way(one, other, 1))
 

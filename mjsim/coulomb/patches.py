@@ -53,7 +53,9 @@ def put_points_back(model: Any, data: Any, memory: Any) -> bool:
         if not 1.99 * far**2 < old.moved < math.inf:  # what is nearer has rolled
             continue
         place_lost_point(model, data, old)
-        if old.gap >= 0 or old.moved >= (near / 10) ** 2 or not is_lost(data, memory, old, near):
+        if old.gap >= 0 or old.moved >= (near / 10) ** 2:
+            continue
+        if not is_lost(data, memory, old, min(near, far)):  # floors may be much larger
             continue
         complete_frame(old.frame)
         if widest_angle(data, old) > CORNER:
@@ -175,11 +177,8 @@ def place_lost_point(model: Any, data: Any, old: Any) -> None:
 
 @kernel
 def is_lost(data: Any, memory: Any, old: Any, near: float) -> bool:
-    """Whether the collider has no more points of these two faces than before, and none near this
-    one: of the corners of a polygon, and of a heightfield, it takes some by turns.
-
-    Points whose normals lie across are those of inner walls of a heightfield, which come and go.
-    """
+    """Whether the collider has no more closed points of these two faces than before, and none near
+    this one: of the corners of a polygon, and of a heightfield, it takes some by turns."""
     before = contacts_at(memory.before_at, memory.contacts_before)
     found = engine_contacts(data.contact, data.ncon)
     had, left = 0, 0
@@ -187,21 +186,27 @@ def is_lost(data: Any, memory: Any, old: Any, near: float) -> bool:
         across = cosine(before[i].frame[0], old.frame[0]) < ACROSS
         had += same_geoms(before[i].geoms, old.geoms) and not across
     for i in range(data.ncon):
-        across = cosine(found[i].frame, old.frame[0]) < ACROSS
-        if same_geoms(found[i].geom, old.geoms) and not across:
-            left, old.index = left + 1, i
+        if is_of_face(found[i], old):
+            left, old.index = left + (found[i].dist <= 0), i
     return bool(0 < left <= had and not has_near(data, old, near))
 
 
 @kernel
+def is_of_face(given: Any, old: Any) -> bool:
+    """Whether a point of mjData is one of the two faces of a contact: those whose normals lie
+    across are of inner walls of a heightfield, which come and go."""
+    return bool(same_geoms(given.geom, old.geoms) and cosine(given.frame, old.frame[0]) >= ACROSS)
+
+
+@kernel
 def has_near(data: Any, contact: Any, near: float) -> bool:
-    """Whether mjData has a point of this pair of geoms near this one."""
+    """Whether mjData has a point of these two faces near this one."""
     found = engine_contacts(data.contact, data.ncon)
     for i in range(data.ncon):
         square = 0.0
         for j in range(3):
             square += (found[i].pos[j] - contact.pos[j]) ** 2
-        if square <= near**2 and same_geoms(found[i].geom, contact.geoms):
+        if square <= near**2 and is_of_face(found[i], contact):
             return True
     return False
 
@@ -228,10 +233,10 @@ def widest_angle(data: Any, old: Any) -> float:
     """The widest angle without other points of the patch that a lost point sees, rad."""
     found, widest = engine_contacts(data.contact, data.ncon), 0.0
     for i in range(data.ncon):
-        if same_geoms(found[i].geom, old.geoms):
+        if is_of_face(found[i], old):
             angle, gap = angle_to(found[i].pos, old), 2 * math.pi
             for k in range(data.ncon):
-                if k != i and same_geoms(found[k].geom, old.geoms):
+                if k != i and is_of_face(found[k], old):
                     gap = min(gap, (angle_to(found[k].pos, old) - angle) % (2 * math.pi))
             widest = max(widest, gap)
     return widest

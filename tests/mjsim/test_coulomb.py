@@ -219,11 +219,13 @@ def test_a_finely_meshed_heightfield_holds_what_covers_many_of_its_cells(geom):
     assert data.qpos[2] == pytest.approx(0.05, abs=1e-4)
 
 
-@pytest.mark.parametrize("seed", [6, 12, 18, 39, 51, 174])
-def test_what_lands_on_a_coarse_heightfield_comes_to_rest(seed):
+@pytest.mark.parametrize(("cells", "size"), [(10, 3), (100, 30)])
+@pytest.mark.parametrize("seed", [6, 12, 18, 29, 39, 51, 174])
+def test_what_lands_on_a_coarse_heightfield_comes_to_rest(seed, cells, size):
     """On a cell the collider has one point of it, of one corner now, of another in the next step,
-    beside some of inner walls: it sank in, shook for ever, or fell through."""
-    hill = '<hfield name="hill" nrow="11" ncol="11" size="3 3 .1 .1"/>'
+    beside some of inner walls: it sank in, shook for ever, or fell through. How large a floor is
+    doesn't matter: of 200 such boxes on the larger one 188 did so."""
+    hill = f'<hfield name="hill" nrow="{cells + 1}" ncol="{cells + 1}" size="{size} {size} .1 .1"/>'
     box = free("box", ".013 .02 .3", 'type="box" size=".05 .04 .03"')
     bodies = '<geom type="hfield" hfield="hill"/>' + box
     made, data = world(bodies, more=f"<asset>{hill}</asset>", mu=0.5)
@@ -233,6 +235,22 @@ def test_what_lands_on_a_coarse_heightfield_comes_to_rest(seed):
     Coulomb(made, rigid=True).step(data, 1500)
     assert data.qpos[2] > 0.03 - 1e-6
     assert np.abs(data.qvel).max() < 1e-6
+
+
+def test_what_slides_over_the_corner_of_a_cell_keeps_its_corners():
+    """Inner walls, which pass near its corners, took over what these bore: it tipped, and a wall
+    stopped it with 16 times its weight."""
+    hill = '<hfield name="hill" nrow="17" ncol="17" size="4 4 .1 .1"/>'
+    angle, mu, speed = math.radians(323), 0.3, 1.5
+    box = free("box", "0 0 .05", 'type="box" size=".1 .1 .05"')
+    bodies = '<geom type="hfield" hfield="hill"/>' + box
+    made, data = world(bodies, more=f"<asset>{hill}</asset>", mu=mu)
+    ahead = np.array([math.cos(angle), math.sin(angle)])
+    data.qpos[:2], data.qvel[:2] = 0.013 * ahead, speed * ahead
+    data.qpos[3], data.qpos[6] = math.cos(angle / 2), math.sin(angle / 2)
+    Coulomb(made, rigid=True).step(data, 600)
+    way = speed**2 / (2 * mu * G)
+    assert ahead @ data.qpos[:2] - 0.013 == pytest.approx(way, rel=0.01)
 
 
 @WAYS
