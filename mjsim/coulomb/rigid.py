@@ -30,7 +30,7 @@ def stiffen(model: Any, data: Any, memory: Any) -> None:
     rows = rows_of(memory)
     for i in range(memory.contacts):
         contact, first = contacts[i], contacts[i].address
-        goal = velocity_to_ask_for(model, memory, contact, estimate[first])
+        goal = velocity_to_ask_for(model, memory, contact, velocity[first], estimate[first])
         if memory.bounces:
             goal = bounced(model, data, memory, contact, goal)
         factor = memory.law.regularisation * estimate[first] / rows[first].R
@@ -63,16 +63,20 @@ def depth_kept(model: Any, memory: Any, contact: Any) -> float:
 
 
 @kernel
-def velocity_to_ask_for(model: Any, memory: Any, contact: Any, estimate: float) -> float:
+def velocity_to_ask_for(
+    model: Any, memory: Any, contact: Any, speed: float, estimate: float
+) -> float:
     """Normal velocity that closes a gap in the step, or takes a share of a depth away, m s-1; by
     the inverse mass that the engine estimates, kg-1.
 
-    So it does of the gap of a contact that has borne something: closed at once, that would be an
-    impact.
+    So it does of the gap of a contact that has borne something and would close: closed at once,
+    that would be an impact. (Points of contact jump by the length of a cell of a heightfield, and
+    hand on what they bear: one that is far off still mustn't bear it.)
     """
     h, law = model.opt.timestep, memory.law
     if contact.gap > 0:
-        return float(-contact.gap / h * (law.push if contact.load > 0 else 1.0))
+        closes = contact.gap < h * (h * memory.gravity - speed)
+        return float(-contact.gap / h * (law.push if closes and contact.load > 0 else 1.0))
     kept = depth_kept(model, memory, contact)
     fastest = math.inf if is_moved_by_hand(model, contact) else h * memory.gravity
     if estimate * rows_of(memory)[contact.address].remembered > STUCK * memory.gravity:

@@ -253,6 +253,20 @@ def test_what_slides_over_the_corner_of_a_cell_keeps_its_corners():
     assert ahead @ data.qpos[:2] - 0.013 == pytest.approx(way, rel=0.01)
 
 
+def test_a_wheel_rolls_over_cells_of_a_heightfield_as_over_a_plane():
+    """It bore on points some mm below it, to which the collider jumped, and lost 4 % of its way."""
+    hill = '<hfield name="hill" nrow="21" ncol="21" size="4 4 .1 .1"/>'
+    geom = 'type="cylinder" size=".15 .05" euler="90 0 0"'
+    wheel = free("wheel", "0 0 .15", geom, euler="0 0 133")
+    bodies = '<geom type="hfield" hfield="hill"/>' + wheel
+    made, data = world(bodies, more=f"<asset>{hill}</asset>", mu=0.8)
+    angle, speed = math.radians(133), 1.5
+    ahead = np.array([math.cos(angle), math.sin(angle)])
+    data.qvel[:2], data.qvel[4] = speed * ahead, speed / 0.15
+    Coulomb(made, rigid=True).step(data, 500)
+    assert ahead @ data.qpos[:2] == pytest.approx(speed, rel=5e-3)
+
+
 @WAYS
 @pytest.mark.parametrize(("y", "tilt"), [(0.2, -5), (0.1, 20)])
 def test_what_lands_across_the_rim_of_a_box_bears_on_it(rigid, y, tilt):
