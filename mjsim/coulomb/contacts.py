@@ -312,9 +312,8 @@ def find_kinds(data: Any, memory: Any) -> None:
 
 @kernel
 def square_apart(one: Any, other: Any) -> float:
-    """Square of how far apart two contacts are on their bodies, m2; infinite for other geoms, and
-    for other faces of them: an inner wall of a heightfield mustn't inherit what its cells bear."""
-    if not same_geoms(one.geoms, other.geoms) or cosine(one.normal, other.normal) < ACROSS:
+    """Square of how far apart two contacts are on their bodies, m2; infinite for other geoms."""
+    if not same_geoms(one.geoms, other.geoms):
         return math.inf
     return float(square_way(one, other, 0) + square_way(one, other, 1))
 
@@ -353,9 +352,10 @@ def pair_of(model: Any, contact: Any) -> int:
 
 @kernel
 def nearest(model: Any, memory: Any, old: Any) -> int:
-    """The contact of this step nearest to one before; -1 if none is of its geoms."""
+    """The contact of this step nearest to one before; -1 if none is of its geoms. An inner wall of
+    a heightfield mustn't inherit what its cells bear."""
     contacts, pairs = contacts_of(memory), pairs_at(memory.pair_at, memory.contacts)
-    key, low, high = pair_of(model, old), 0, len(pairs)
+    key, low, high, on_cells = pair_of(model, old), 0, len(pairs), hops(model, old.geoms)
     while low < high:
         middle = (low + high) // 2
         if pairs[middle].geoms < key:
@@ -364,8 +364,9 @@ def nearest(model: Any, memory: Any, old: Any) -> int:
             high = middle
     best, least = -1, math.inf
     while low < len(pairs) and pairs[low].geoms == key:
-        square = square_apart(contacts[pairs[low].contact], old)
-        if square < least:
+        contact = contacts[pairs[low].contact]
+        square, across = square_apart(contact, old), cosine(contact.normal, old.normal) < ACROSS
+        if square < least and not (on_cells and across):
             best, least = pairs[low].contact, square
         low += 1
     return int(best)
