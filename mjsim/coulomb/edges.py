@@ -15,7 +15,7 @@ from .compiling import kernel
 from .contacts import cosine, leave_out, same_geoms, smaller_radius
 from .engine import HEIGHTFIELD, engine_contacts, integers, reals, singles
 from .memory import contacts_of
-from .parameters import ALIGNED, AT_MOST, EDGE
+from .parameters import ALIGNED, AT_MOST, EDGE, LEVEL
 
 
 @kernel
@@ -115,21 +115,29 @@ def height_above(model: Any, data: Any, piece: int, floor: Any, up: float) -> fl
 
 @kernel
 def is_steeper(model: Any, data: Any, edge: Any) -> bool:
-    """Whether a contact with a heightfield is steeper than all cells around; not at its border."""
-    piece, x, y, up = edge.geoms[edge.piece], 0.0, 0.0, 0.0
+    """Whether a contact with a heightfield leans farther to one side than all cells around; not at
+    its border."""
+    piece, x, y = edge.geoms[edge.piece], 0.0, 0.0
     place = reals(data.geom_xpos, (model.ngeom, 3))[piece]
     axes = reals(data.geom_xmat, (model.ngeom, 3, 3))[piece]
+    along, across, up = 0.0, 0.0, 0.0  # its normal, in the axes of the heightfield
     for j in range(3):
-        way = edge.pos[j] - place[j]
-        x, y, up = x + axes[j, 0] * way, y + axes[j, 1] * way, up + axes[j, 2] * edge.frame[0, j]
-    slope = steepest_slope(model, integers(model.geom_dataid, model.ngeom)[piece], x, y)
-    return bool(abs(up) < 1 / math.sqrt(1 + slope**2) - ALIGNED)
+        way, normal = edge.pos[j] - place[j], edge.frame[0, j]
+        x, y = x + axes[j, 0] * way, y + axes[j, 1] * way
+        along, across = along + axes[j, 0] * normal, across + axes[j, 1] * normal
+        up += axes[j, 2] * normal
+    if up < 0:
+        along, across, up = -along, -across, -up
+    level, field = max(up, LEVEL), integers(model.geom_dataid, model.ngeom)[piece]
+    a, b = nearest_slopes(model, field, x, y, -along / level, -across / level)
+    cosine_to_cells = (up - a * along - b * across) / math.sqrt(1 + a**2 + b**2)
+    return bool(cosine_to_cells < 1 - ALIGNED)
 
 
 @kernel
-def steepest_slope(model: Any, field: int, x: float, y: float) -> float:
-    """The largest slope of the four cells of a heightfield about its point next to x, y; infinite
-    at its border."""
+def nearest_slopes(model: Any, field: int, x: float, y: float, along: float, across: float) -> Any:
+    """Of the slopes along and across that the four cells of a heightfield about its point next to
+    x, y have, those nearest to given ones; these themselves at its border."""
     rows = integers(model.hfield_nrow, model.nhfield)[field]
     columns = integers(model.hfield_ncol, model.nhfield)[field]
     size = reals(model.hfield_size, (model.nhfield, 4))[field]
@@ -138,12 +146,15 @@ def steepest_slope(model: Any, field: int, x: float, y: float) -> float:
     wide, long = 2 * size[0] / (columns - 1), 2 * size[1] / (rows - 1)
     row, column = round((y + size[1]) / long), round((x + size[0]) / wide)
     if not (0 < row < rows - 1 and 0 < column < columns - 1):
-        return math.inf
-    along, across = 0.0, 0.0
-    for i in range(row - 1, row + 2):
-        for k in range(column - 1, column + 2):
-            if k > column - 1:
-                along = max(along, abs(heights[i, k] - heights[i, k - 1]) / wide)
-            if i > row - 1:
-                across = max(across, abs(heights[i, k] - heights[i - 1, k]) / long)
-    return float(size[2] * math.sqrt(along**2 + across**2))
+        return along, across
+    least_along, most_along, least_across, most_across = math.inf, -math.inf, math.inf, -math.inf
+    for i in range(-1, 2):
+        for k in range(2):
+            here, there = heights[row + i, column + k], heights[row + i, column + k - 1]
+            slope = size[2] * (here - there) / wide
+            least_along, most_along = min(least_along, slope), max(most_along, slope)
+            here, there = heights[row + k, column + i], heights[row + k - 1, column + i]
+            slope = size[2] * (here - there) / long
+            least_across, most_across = min(least_across, slope), max(most_across, slope)
+    along = min(max(along, least_along), most_along)
+    return along, min(max(across, least_across), most_across)

@@ -87,6 +87,8 @@ ACROSS = 0.7
 EDGE = 1e-3
 """How high above a floor the edge of one of its pieces may stand, in units of the smaller radius,
 for what slides not to stop there."""
+LEVEL = 1e-9
+"""Least share of a normal that counts as upwards, for its slope to be a number."""
 NARROW = 1e-3
 """Square of the width of a face, in units of its length, below which its points lie on a line."""
 APART = 1e9

@@ -209,6 +209,29 @@ def test_what_slides_over_a_heightfield_stops_at_no_edge_of_its_cells(rigid, geo
     assert np.linalg.norm(data.qpos[:3] - begin) == pytest.approx(way, rel=0.02)
 
 
+@pytest.mark.parametrize("turned", [203, 323])
+def test_what_slides_down_across_tilted_cells_isnt_held_by_their_seams(turned):
+    """Normals of seams lean uphill, no farther than cells downhill do: they count as edges, too."""
+    angle, mu, time = math.radians(15), 0.15, 0.7
+    x, y = np.meshgrid(*2 * [np.linspace(-4, 4, 63)])
+    along, across = math.cos(math.radians(turned)), math.sin(math.radians(turned))
+    heights = -math.tan(angle) * (along * x + across * y)
+    rise = np.ptp(heights)
+    hill = f'<hfield name="hill" nrow="63" ncol="63" size="4 4 {rise} .5"/>'
+    bodies = f'<geom type="hfield" hfield="hill" pos="0 0 {heights.min()}"/>'
+    box = free("box", "0 0 0", 'type="box" size=".1 .1 .05"')
+    made, data = world(bodies + box, more=f"<asset>{hill}</asset>", mu=mu)
+    made.hfield_data[:] = (heights.ravel() - heights.min()) / rise
+    normal = np.array([along * math.sin(angle), across * math.sin(angle), math.cos(angle)])
+    down = np.array([along * math.cos(angle), across * math.cos(angle), -math.sin(angle)])
+    axes = np.stack([down, np.cross(normal, down), normal], axis=1)
+    mujoco.mju_mat2Quat(data.qpos[3:], axes.ravel())
+    data.qpos[:3] = begin = 0.05 * normal + 0.013 * down
+    Coulomb(made, rigid=True).step(data, round(time / made.opt.timestep))
+    way = G * (math.sin(angle) - mu * math.cos(angle)) * time**2 / 2
+    assert (data.qpos[:3] - begin) @ down == pytest.approx(way, rel=5e-3)
+
+
 @pytest.mark.parametrize("geom", [BOX, 'type="capsule" size=".05 .05"'])
 def test_a_finely_meshed_heightfield_holds_what_covers_many_of_its_cells(geom):
     """MuJoCo takes 50 points of it: of more, those within the margin pushed out those below."""
