@@ -69,13 +69,14 @@ def velocity_to_ask_for(
     """Normal velocity that closes a gap in the step, or takes a share of a depth away, m s-1; by
     the inverse mass that the engine estimates, kg-1.
 
-    So it does of the gap of a contact that has borne something and would close: closed at once,
-    that would be an impact. (Points of contact jump by the length of a cell of a heightfield, and
-    hand on what they bear: one that is far off still mustn't bear it.)
+    Of the gap of a contact that has borne something, and would close under that and a weight, it
+    takes the same share: closed at once, that would be an impact. (Points of contact jump by the
+    length of a cell of a heightfield, and hand on what they bear: one that is far off still mustn't
+    bear it.)
     """
     h, law = model.opt.timestep, memory.law
     if contact.gap > 0:
-        closes = contact.gap < h * (h * memory.gravity - speed)
+        closes = contact.gap < h * (h * (memory.gravity + estimate * contact.load) - speed)
         return float(-contact.gap / h * (law.push if closes and contact.load > 0 else 1.0))
     kept = depth_kept(model, memory, contact)
     fastest = math.inf if is_moved_by_hand(model, contact) else h * memory.gravity
