@@ -3,7 +3,7 @@ next, or one cell, would stop. Contacts with them are left out.
 
 A convex geom lies above all of a contact that it has. What reaches no higher than this contact, the
 geom can't run against: a contact with it that has another normal is one of an inner edge. A
-heightfield has no normal that is steeper than its cells around.
+heightfield has no normal that leans farther to one side than its cells around.
 """
 
 from __future__ import annotations
