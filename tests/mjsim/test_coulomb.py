@@ -243,7 +243,7 @@ def test_a_finely_meshed_heightfield_holds_what_covers_many_of_its_cells(geom):
 
 
 @pytest.mark.parametrize(("cells", "size"), [(10, 3), (100, 30)])
-@pytest.mark.parametrize("seed", [6, 12, 18, 29, 39, 51, 174])
+@pytest.mark.parametrize("seed", [6, 12, 18, 19, 29, 39, 51, 174])
 def test_what_lands_on_a_coarse_heightfield_comes_to_rest(seed, cells, size):
     """On a cell the collider has one point of it, of one corner now, of another in the next step,
     beside some of inner walls: it sank in, shook for ever, or fell through. How large a floor is
