@@ -43,9 +43,11 @@ BOX, BALL = 'type="box" size=".05 .05 .05" mass="1"', 'type="sphere" size=".05" 
 FLAT = 'type="box" size=".1 .1 .05" mass="1"'
 LONG = "falling heap of 216", "at rest, 1000"
 """Scenes that are measured with soft contacts only: others take half an hour."""
-HEAPS, FALL, FIRST, EVERY, HALF = 5, 600, 30, 6, 0.05
-"""Heaps of each size; steps in which they fall; the first one, and every which, that is solved
-anew; half an edge of a box, m."""
+HEAPS, FALL = 5, 600
+"""Heaps of each size, and steps in which they fall."""
+FIRST, EVERY, HALF = 30, 6, 0.05
+"""Of these steps how many come before the first that is solved again, and from one to the next;
+half an edge of a box, m."""
 PILES, BODIES, SETTLING, LAST = 10, 18, 5.0, 1.0
 STILL, RISE = 1e-9, 1e-9
 """Most that a body at rest moves in the last second, m; and that energy rises, J."""
@@ -398,7 +400,7 @@ def choices() -> Rows:
     return rows
 
 
-def single_steps(count: int, seed: int, rigid: bool) -> Iterator[float]:
+def speed_errors(count: int, seed: int, rigid: bool) -> Iterator[float]:
     """By how much steps of a falling heap are off: the greatest difference of a speed, of middles
     or of edges about them, to that of the same step solved a hundred times as exactly, in units of
     gravity times the step; nan where that wasn't reached."""
@@ -425,7 +427,7 @@ def speeds() -> Rows:
     head = ["heaps", "steps", "no reference", "off by more than 0.01 g h"]
     rows = [[*head, "nine of ten, g h", "the greatest, g h"]]
     for count, rigid in itertools.product((8, 27, 64), (False, True)):
-        found = [each for seed in range(HEAPS) for each in single_steps(count, seed, rigid)]
+        found = [each for seed in range(HEAPS) for each in speed_errors(count, seed, rigid)]
         off = np.array(found)[np.isfinite(found)]
         name = f"{count} boxes, {'rigid' if rigid else 'soft'}"
         counts = str(len(found)), str(len(found) - len(off)), f"{np.mean(off > 0.01):.0%}"

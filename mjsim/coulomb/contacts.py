@@ -365,8 +365,9 @@ def nearest(model: Any, memory: Any, old: Any) -> int:
     best, least = -1, math.inf
     while low < len(pairs) and pairs[low].geoms == key:
         contact = contacts[pairs[low].contact]
-        square, across = square_apart(contact, old), cosine(contact.normal, old.normal) < ACROSS
-        if square < least and not (on_cells and across):
+        square = square_apart(contact, old)
+        across = on_cells and cosine(contact.normal, old.normal) < ACROSS
+        if square < least and not across:
             best, least = pairs[low].contact, square
         low += 1
     return int(best)

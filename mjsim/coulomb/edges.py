@@ -129,8 +129,9 @@ def is_steeper(model: Any, data: Any, edge: Any) -> bool:
     if up < 0:
         along, across, up = -along, -across, -up
     level, field = max(up, LEVEL), integers(model.geom_dataid, model.ngeom)[piece]
-    a, b = nearest_slopes(model, field, x, y, -along / level, -across / level)
-    cosine_to_cells = (up - a * along - b * across) / math.sqrt(1 + a**2 + b**2)
+    slope_x, slope_y = nearest_slopes(model, field, x, y, -along / level, -across / level)
+    length = math.sqrt(1 + slope_x**2 + slope_y**2)
+    cosine_to_cells = (up - slope_x * along - slope_y * across) / length
     return bool(cosine_to_cells < 1 - ALIGNED)
 
 

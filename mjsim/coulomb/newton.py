@@ -325,7 +325,7 @@ def hold_forces(memory: Any) -> float:
 @kernel
 def solve_contacts(model: Any, data: Any, memory: Any, a: Any, scale: float) -> bool:
     """Solve for the accelerations `a` with contacts that close, until none closes that was open;
-    `scale` of R is where each island begins.
+    each island begins with `scale` times R.
 
     Slip that is predicted, and forces that are held, are those that it comes to. Returns whether it
     came to an end.

@@ -183,19 +183,18 @@ def is_lost(data: Any, memory: Any, old: Any, near: float) -> bool:
     found = engine_contacts(data.contact, data.ncon)
     had, left = 0, 0
     for i in range(len(before)):
-        across = cosine(before[i].frame[0], old.frame[0]) < ACROSS
-        had += same_geoms(before[i].geoms, old.geoms) and not across
+        had += is_of_face(before[i].geoms, before[i].frame[0], old)
     for i in range(data.ncon):
-        if is_of_face(found[i], old):
+        if is_of_face(found[i].geom, found[i].frame, old):
             left, old.index = left + (found[i].dist <= 0), i
     return bool(0 < left <= had and not has_near(data, old, near))
 
 
 @kernel
-def is_of_face(given: Any, old: Any) -> bool:
-    """Whether a point of mjData is one of the two faces of a contact: those whose normals lie
-    across are of inner walls of a heightfield, which come and go."""
-    return bool(same_geoms(given.geom, old.geoms) and cosine(given.frame, old.frame[0]) >= ACROSS)
+def is_of_face(geoms: Any, normal: Any, old: Any) -> bool:
+    """Whether a point is one of the two faces of a contact: those whose normals lie across are of
+    inner walls of a heightfield, which come and go."""
+    return bool(same_geoms(geoms, old.geoms) and cosine(normal, old.frame[0]) >= ACROSS)
 
 
 @kernel
@@ -206,7 +205,7 @@ def has_near(data: Any, contact: Any, near: float) -> bool:
         square = 0.0
         for j in range(3):
             square += (found[i].pos[j] - contact.pos[j]) ** 2
-        if square <= near**2 and is_of_face(found[i], contact):
+        if square <= near**2 and is_of_face(found[i].geom, found[i].frame, contact):
             return True
     return False
 
@@ -233,10 +232,10 @@ def widest_angle(data: Any, old: Any) -> float:
     """The widest angle without other points of the patch that a lost point sees, rad."""
     found, widest = engine_contacts(data.contact, data.ncon), 0.0
     for i in range(data.ncon):
-        if is_of_face(found[i], old):
+        if is_of_face(found[i].geom, found[i].frame, old):
             angle, gap = angle_to(found[i].pos, old), 2 * math.pi
             for k in range(data.ncon):
-                if k != i and is_of_face(found[k], old):
+                if k != i and is_of_face(found[k].geom, found[k].frame, old):
                     gap = min(gap, (angle_to(found[k].pos, old) - angle) % (2 * math.pi))
             widest = max(widest, gap)
     return widest

@@ -67,7 +67,7 @@ def velocity_to_ask_for(
     model: Any, memory: Any, contact: Any, speed: float, estimate: float
 ) -> float:
     """Normal velocity that closes a gap in the step, or takes a share of a depth away, m s-1; by
-    the inverse mass that the engine estimates, kg-1.
+    that which the contact has, `speed`, and the inverse mass that the engine estimates, kg-1.
 
     Of the gap of a contact that has borne something, and would close under that and a weight, it
     takes the same share: closed at once, that would be an impact. (Points of contact jump by the
