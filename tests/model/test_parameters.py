@@ -177,7 +177,7 @@ def test_files_that_cannot_be_read_or_written(tmp_path):
     with pytest.raises(StorageError, match="No such file"):
         Parameters.load(tmp_path / "absent.toml")
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(StorageError, match="not valid TOML"):
+    with pytest.raises(StorageError, match="not valid TOML: it must be text in UTF-8"):
         Parameters.load(tmp_path / "binary.toml")
     with pytest.raises(StorageError, match="cannot write"):
         REFERENCE.save(tmp_path / "absent" / "p.toml")
