@@ -29,6 +29,7 @@ import numpy as np
 import analytic
 import mjsim
 from analytic.bifurcation.diagram import threshold_curves
+from compare import plot
 from model import Case, Flow, Parameters
 
 plt.rcParams |= {
@@ -63,25 +64,11 @@ for name, meaning in meanings.items():
 # %% [markdown]
 # ## The characteristic curve
 #
-# For each flow the theory lists the steady motions. Thick: a disturbed ball comes back
-# to it. Thin: it does not. Circles: MuJoCo, started at rest at each flow and simulated
+# For each flow the theory lists the steady motions. Solid: a disturbed ball comes back
+# to it. Dashed: it does not. Circles: MuJoCo, started at rest at each flow and simulated
 # for 40 seconds.
 
 # %% tags=["hide-input"]
-colours = {Case.RR: "#0072B2", Case.SS: "#D55E00", Case.NR: "#009E73"}
-flows = np.linspace(0.5, 48, 191)
-listed = []
-for omega_0 in flows:
-    q = p.replace(omega_0=float(omega_0))
-    attracting = {
-        (each.case, float(each.x[2])) for each in analytic.stable_solutions(q)
-    }
-    listed += [
-        (omega_0, each.case, each.x[2], (each.case, float(each.x[2])) in attracting)
-        for each in analytic.stationary_solutions(q)
-        if each.exists and each.case in colours
-    ]
-
 starts = np.linspace(4, 44, 11)
 settings = mjsim.RigidContacts(timestep=4e-3)
 at_rest = [0.0] * 6
@@ -93,19 +80,7 @@ runs = mjsim.simulate_many(
 )
 
 figure, axes = plt.subplots()
-axes.plot(flows, flows, color="0.8", lw=6, label=r"$\omega_c = \omega_0$", zorder=0)
-for case, colour in colours.items():
-    for stable, size in ((True, 7), (False, 1)):
-        points = [
-            (omega_0, omega_c)
-            for omega_0, of, omega_c, held in listed
-            if of is case and held is stable
-        ]
-        label = f"{case.name}{'' if stable else ', unstable'}"
-        if points:
-            axes.plot(
-                *zip(*points, strict=True), ".", color=colour, ms=size, label=label
-            )
+plot.characteristic(p, axes)
 axes.plot(
     starts,
     [run.omega_c[-1] for run in runs],
@@ -115,9 +90,6 @@ axes.plot(
     ms=6,
     label="MuJoCo, from rest",
 )
-for name in ("omega_01", "omega_02", "omega_04"):
-    axes.axvline(getattr(limits, name), color="0.6", lw=0.8, ls=":")
-axes.set(xlabel=r"$\omega_0$ (rad/s)", ylabel=r"$\omega_c$ (rad/s)")
 axes.legend(fontsize=8)
 figure.tight_layout()
 plt.show()
