@@ -12,8 +12,6 @@ An engine other than the one on trial, with time steps of its own, measures as m
 level at every level, but for what `OWN_STEPS` says, and looks where the one on trial found
 something."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from dataclasses import KW_ONLY, dataclass, replace

@@ -1,7 +1,5 @@
 """The main job: measure, judge claim by claim, keep the results, write the report."""
 
-from __future__ import annotations
-
 import math
 import os
 from collections import Counter

@@ -9,8 +9,6 @@ the sphere is greater by. A law is that factor as a function of Re:
   1978);
 * ``quadratic``: C_D Re/24 with a constant C_D."""
 
-from __future__ import annotations
-
 STOKES, SCHILLER_NAUMANN, QUADRATIC = LAWS = ("stokes", "schiller-naumann", "quadratic")
 REYNOLDS = {STOKES: (0.0, 1.0), SCHILLER_NAUMANN: (0.0, 2e5), QUADRATIC: (1e3, 2e5)}
 """From which to which Reynolds number each law is meant; above 2e5 comes the drag crisis."""

@@ -1,7 +1,5 @@
 """What goes wrong, said in one line that a person can act on."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from types import NoneType, UnionType
 from typing import Any, get_args

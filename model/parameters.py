@@ -1,7 +1,5 @@
 """The physical parameters of the ball, the vessel and the fluid (Table 1)."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math

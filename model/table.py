@@ -1,7 +1,5 @@
 """Tables of numbers as text: separators, numbers, and a head of names with units."""
 
-from __future__ import annotations
-
 import csv
 import io
 import itertools

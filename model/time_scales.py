@@ -1,7 +1,5 @@
 """The shortest time of a problem, and the longest step that resolves it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """What a result was computed with: versions of packages, and the program's commit."""
 
-from __future__ import annotations
-
 import functools
 import platform
 import subprocess

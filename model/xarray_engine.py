@@ -1,7 +1,5 @@
 """What xarray reads a run with for ``engine="dualball"``, by an entry point of pyproject.toml."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable
 from pathlib import Path

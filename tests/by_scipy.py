@@ -4,8 +4,6 @@ runs, and in their place where a wrong theory is believed.
 By LSODA or another fast method, except while a slip is small: its direction is stiff then, which
 LSODA doesn't detect where hardly anything else moves, and BDF takes over."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager

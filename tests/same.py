@@ -4,8 +4,6 @@
 A pure refactoring of what measures must leave them so, each quantity in its order. Which runs a
 number came from, and what its uncertainty is made up of, is not compared."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The ball as a flowmeter (section 5.3): its characteristic omega_c(omega_0), and range."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import Enum
 

@@ -37,8 +37,6 @@ impulses near the present ones hold it.
 
 All on plain floats, and compiled."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

@@ -2,8 +2,6 @@
 
 `mjsim.coulomb` has its own: theory imports nothing of it, and its wheel has no theory."""
 
-from __future__ import annotations
-
 import gc
 import hashlib
 from collections.abc import Callable

@@ -13,8 +13,6 @@ about the vertical never changes.
 
 The first is the azimuth, or Z, the last the work of drag and friction, J. Compiled."""
 
-from __future__ import annotations
-
 import cmath
 import math
 from typing import Any

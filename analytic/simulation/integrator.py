@@ -4,8 +4,6 @@ By the explicit steps of `solvers`, except while a slip is small: its direction 
 implicit ones take over. Where both need tiny steps because only round-off is left, the motion is
 continued along a straight line. Compiled, like `equations`."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -7,8 +7,6 @@ slip directions are then those of the contact problem of the accelerations.
 
 All on plain floats, cases and guards by number, and compiled."""
 
-from __future__ import annotations
-
 import math
 
 from analytic.mechanics import contact_problem, rigid_body

@@ -1,7 +1,5 @@
 """Exact contact cases, engines on trial on them, and the league."""
 
-from __future__ import annotations
-
 import importlib
 from typing import TYPE_CHECKING, Any
 

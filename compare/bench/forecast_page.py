@@ -1,7 +1,5 @@
 """A forecast in words, tables and as a page."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """MuJoCo in the league on the study's joints."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A directory that one program at a time fills."""
 
-from __future__ import annotations
-
 import os
 import platform
 import sys

@@ -1,8 +1,6 @@
 """How far a program is: one live line on a terminal, a plain line every ten seconds elsewhere,
 nothing when quiet."""
 
-from __future__ import annotations
-
 import sys
 import threading
 import time

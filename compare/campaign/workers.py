@@ -2,8 +2,6 @@
 
 Both are executors of `concurrent.futures`, and `Workers` says what else a campaign must know."""
 
-from __future__ import annotations
-
 import logging
 import os
 import signal

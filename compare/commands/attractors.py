@@ -1,7 +1,5 @@
 """``dualball attractors``, ``basins``: what balls come to, over starts and over parameters."""
 
-from __future__ import annotations
-
 import argparse
 import itertools
 import shlex

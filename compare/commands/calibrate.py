@@ -1,7 +1,5 @@
 """``dualball calibrate``: the calibration curve of a meter, from theory and in a meter's words."""
 
-from __future__ import annotations
-
 import argparse
 import math
 from typing import Any

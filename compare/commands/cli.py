@@ -4,8 +4,6 @@ Exit codes: 0 done and as expected, 1 a verdict on the engine on trial failed, a
 a design doesn't reach its fastest flow, 2 a mistake in what was asked, 130 interrupted by Ctrl-C,
 143 by SIGTERM, 129 by a terminal that is closed, 152 where processor time is used up."""
 
-from __future__ import annotations
-
 import argparse
 import errno
 import gc

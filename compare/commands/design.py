@@ -1,7 +1,5 @@
 """``dualball design``: the best meter for a fluid and a range of flows, within bounds."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """Shows what is stored: ``figures``, ``inspect``, ``compare``, ``render``; and ``explore``."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """``dualball compare curve.csv``: a measured calibration curve of a meter beside theory."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Sequence
 

@@ -1,8 +1,6 @@
 """All commands: what runs each, what it is for, its options. Nothing here takes long to load, for
 help waits for it."""
 
-from __future__ import annotations
-
 import argparse
 import textwrap
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """``dualball predict``: what theory says of a set; ``parameters``: what a set is."""
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import math

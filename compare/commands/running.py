@@ -1,7 +1,5 @@
 """Command-line options of commands that carry out runs: flow, engine, workers, initial state."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """``dualball simulate``, ``sweep``, ``collect``: a run, many, and one file of all of them."""
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import json

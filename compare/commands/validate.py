@@ -1,7 +1,5 @@
 """``dualball validate`` and ``dualball judge``: the verdicts."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import math

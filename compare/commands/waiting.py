@@ -1,7 +1,5 @@
 """Nothing runs for long without a word: a line for commands without progress of their own."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

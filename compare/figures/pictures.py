@@ -6,8 +6,6 @@ runs, the picture is there all the same. Plotly or Bokeh would need a second des
 figure, and 1 to 5 MB a page; Panzoom, the library, has 10 kB. A label that begins with an
 underscore names a series that no legend lists, as is matplotlib's rule."""
 
-from __future__ import annotations
-
 import functools
 import io
 import json

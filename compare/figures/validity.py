@@ -1,7 +1,5 @@
 """Where the model doesn't hold, in words that all commands and pages share."""
 
-from __future__ import annotations
-
 from analytic.flowmeter import real_fluid
 from model import Parameters
 

@@ -1,7 +1,5 @@
 """Where along omega_0 a run's answer changes: brackets narrowed down, many at a time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 

@@ -4,8 +4,6 @@ A protocol is a function of a runner, the parameter sets, and what was measured 
 measurements, and what it could not measure. To add one, write such a function, and add a line to
 the `PROTOCOLS` of its subject and one to `compare.plan.PLAN`."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections import Counter

@@ -34,8 +34,6 @@ day (their period 2e-2, 4e-2, 2e-3, 2e-2, 1.5e-2; omega_c 2e-2, 4e-2, 2e-3, 2e-2
 2e-2, 3e-2; multiplier 0.1, 0.25); and that of laws in motion, 1e-3 of the median sample, now 6e-3
 of the worst."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Natural sizes, by which deviations and uncertainties are divided, of a parameter set."""
 
-from __future__ import annotations
-
 import math
 
 from model import Parameters

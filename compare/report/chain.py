@@ -1,7 +1,5 @@
 """The chain of a claim, from statement to verdict, each link with its line of the sources."""
 
-from __future__ import annotations
-
 import functools
 import inspect
 import sys

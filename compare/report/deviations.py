@@ -4,8 +4,6 @@ Of numbers whose errors are normally distributed 32 % lie beyond one standard un
 beyond two and .3 % beyond three; of an error that may be anything within bounds 42 %, and none
 beyond two."""
 
-from __future__ import annotations
-
 import math
 from collections import defaultdict
 from collections.abc import Sequence

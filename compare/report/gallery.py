@@ -1,7 +1,5 @@
 """The figures of the report, as the subjects list them."""
 
-from __future__ import annotations
-
 import hashlib
 import html
 from collections import Counter

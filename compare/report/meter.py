@@ -1,7 +1,5 @@
 """A designed meter, shown: tables for the terminal, a page, plain data."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """The report: one self-contained page, from verdicts and the measurements behind them."""
 
-from __future__ import annotations
-
 import base64
 import functools
 import json

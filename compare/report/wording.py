@@ -1,7 +1,5 @@
 """Numbers, conditions and verdicts as a reader sees them; nothing reads them back."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence

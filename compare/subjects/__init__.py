@@ -2,8 +2,6 @@
 
 To take one out, remove both."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from importlib.util import find_spec
 from types import ModuleType

@@ -1,7 +1,5 @@
 """All protocols, and all claims in the order of the report, as the subjects list them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from compare import subjects

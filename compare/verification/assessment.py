@@ -5,8 +5,6 @@ the same with several time steps, and is judged by what `convergence` extrapolat
 required resolution. An engine as it comes measures with its own step alone, and a claim holds if no
 number is off by more than a share of its scale, `Engine.relative_tolerance`."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence

@@ -4,8 +4,6 @@ A `Criterion` picks measurements by protocol, quantity and conditions, and predi
 function of `analytic`. The verdict is computed from the numbers. That the paper's text had to be
 corrected is another matter: `Claim.text`."""
 
-from __future__ import annotations
-
 import math
 import sys
 from collections.abc import Callable, Iterable

@@ -1,7 +1,5 @@
 """Where measurements and predictions meet: the checks of a claim, and the verdict."""
 
-from __future__ import annotations
-
 import functools
 import math
 from collections import Counter

@@ -1,7 +1,5 @@
 """What theory says of a settled state, as claims of several subjects ask for it."""
 
-from __future__ import annotations
-
 import analytic
 from analytic import StationarySolution
 from analytic.bifurcation import diagram as bifurcation

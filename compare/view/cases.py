@@ -1,7 +1,5 @@
 """The nine kinematic cases by picture and in words, along the orbit: floor below, wall right."""
 
-from __future__ import annotations
-
 from compare.figures.style import COLOURS, SLIP
 from model import Case, Contact
 

@@ -5,8 +5,6 @@ NiceGUI serves it: one process and no page to build, with three.js and plotly.js
 that it works without a network. Each tab has a set and a motion of its own, by the event-driven
 simulation."""
 
-from __future__ import annotations
-
 import base64
 import dataclasses
 import errno

@@ -1,7 +1,5 @@
 """Where the ball, its contacts, forces and slips are in a run that is shown, in world axes."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from dataclasses import dataclass

@@ -2,8 +2,6 @@
 
 A browser lets any site that a user visits send requests here, and says in ``Origin`` which one."""
 
-from __future__ import annotations
-
 import asyncio
 from typing import Any
 from urllib.parse import urlsplit

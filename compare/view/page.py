@@ -3,8 +3,6 @@
 The motion is in the page, frame by frame, as are three.js, which NiceGUI brings along, and what
 moves the one by the other (templates/motion.html)."""
 
-from __future__ import annotations
-
 import base64
 import importlib.util
 from pathlib import Path

@@ -4,8 +4,6 @@ A mean over the last quarter is free of swings, and its drift tells how far it h
 some of the way is seen. Of a ball that takes minutes seconds show almost none: no limit is taken to
 be nearer than the time in which the fluid takes the ball along lets it be."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 

@@ -1,7 +1,5 @@
 """What pages with cells share: commands that print as in a terminal."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import os

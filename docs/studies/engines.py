@@ -1,8 +1,6 @@
 """What three engines say in a validation that was kept: rows for the page on MuJoCo's
 settings."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager

@@ -1,8 +1,6 @@
 """How often the zero-step limit is off by more than three of its standard uncertainties: rows
 of a table."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -4,8 +4,6 @@ docs.studies.figures``. Each is written to its place in docs/.
 Figs. 2, 3 and 6 are the nine cases, sections of the state space, and transitions to cases of more
 freedom."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

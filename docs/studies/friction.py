@@ -4,8 +4,6 @@
 All take some ten minutes.
 """
 
-from __future__ import annotations
-
 import copy
 import itertools
 import math

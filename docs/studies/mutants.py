@@ -1,8 +1,6 @@
 """What the verdicts notice: docs/mutants.md and the whole list beside it, docs/mutants.csv, written
 by ``python -m tests.mutants ... --page FILE``."""
 
-from __future__ import annotations
-
 import csv
 from collections import Counter
 from collections.abc import Mapping, Sequence

@@ -3,8 +3,6 @@
 Above the ball and what it touches; below how fast it goes round, by theory, by MuJoCo under
 Coulomb's law and by MuJoCo as it comes: settled runs from rest."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 Each is a function of a `Way`, which steps it and returns what was `Found`.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Callable

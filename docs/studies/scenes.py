@@ -5,8 +5,6 @@ What was found is kept beside the page, as scenes.json, since the packages don't
 version of MuJoCo: run it with ``--only NAME`` in an environment of each package, and with
 ``--kept`` where this project is installed. All take some ten minutes."""
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import importlib.metadata

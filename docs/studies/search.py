@@ -5,8 +5,6 @@ Sets are the points of a scrambled Sobol sequence over mu, eta, j, r/R, kappa = 
 Omega_0 = omega_0 sqrt(R/g). Random starts of each are screened; a ball that still hops after 60/c
 is looked at until its hopping closes, goes on, or ends."""
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import json

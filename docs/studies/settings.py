@@ -3,8 +3,6 @@ docs/records/settings.md, made by `docs.studies.tables`.
 
 Each is tried on the stationary states and the approach to one of `docs.studies.states`."""
 
-from __future__ import annotations
-
 import json
 import statistics
 from collections.abc import Mapping, Sequence

@@ -3,8 +3,6 @@
 Each is a function of a `Way`, which steps it and returns what was `Found`.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from typing import Any

@@ -1,8 +1,6 @@
 """What theory, MuJoCo, campaigns and commands cost, as ratios in one run: ``python -m
 docs.studies.speed docs/records/speed.md`` writes the tables of that page, in some ten minutes."""
 
-from __future__ import annotations
-
 import itertools
 import os
 import subprocess

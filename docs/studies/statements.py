@@ -1,8 +1,6 @@
 """Where each statement is checked, docs/records/statements.md: by a claim, on measurements, or by a
 test, theory against theory."""
 
-from __future__ import annotations
-
 from compare.figures.pages import Rows
 from compare.subjects.catalogue import CLAIMS
 

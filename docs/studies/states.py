@@ -5,8 +5,6 @@ A run of a state starts at rest against the wall, which is no solution of the pr
 only once that start is forgotten: a run that began in the state would stay there whatever it would
 have converged to."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

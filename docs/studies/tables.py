@@ -4,8 +4,6 @@ docs/records/settings.md``; or of another.
 Each table stands between two lines ``<!-- begin: NAME -->`` and ``<!-- end: NAME -->``. Runs are
 kept in a results directory and not computed again."""
 
-from __future__ import annotations
-
 import argparse
 import functools
 import json

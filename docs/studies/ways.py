@@ -4,8 +4,6 @@ stepped.
 Needs MuJoCo, NumPy and `mujoco_coulomb` alone, so that it runs beside any package that brings
 scenes."""
 
-from __future__ import annotations
-
 import functools
 import math
 import time

@@ -1,8 +1,6 @@
 """A verdict is computed from the numbers, and can be lost in every way; what bears on claims is
 listed whole."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import time

@@ -1,7 +1,5 @@
 """``python -m tests.mutants``: try the verdicts, and write the page that says what they notice."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

@@ -1,7 +1,5 @@
 """Wrong engines: MuJoCo with one hidden fault."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext

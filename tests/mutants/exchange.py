@@ -1,8 +1,6 @@
 """Putting a wrong function in the place of a right one, wherever it is known, for as long as a
 context lasts."""
 
-from __future__ import annotations
-
 import importlib
 import sys
 from collections.abc import Callable, Iterator, Mapping

@@ -1,8 +1,6 @@
 """Faults out of a grammar of formulas: a sign, a factor, an argument, a power, a case mixed up, at
 a place in the source of a function that chance chooses."""
 
-from __future__ import annotations
-
 import ast
 import inspect
 import textwrap

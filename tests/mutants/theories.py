@@ -3,8 +3,6 @@
 Most change the answer of the right function, or the parameters of the ball it is given.
 """
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable, Mapping
 from dataclasses import replace

@@ -4,8 +4,6 @@
 theory; with ``--engines`` it also measures with every wrong engine. It exits with 1 if more of them
 go unnoticed than may."""
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Iterable, Sequence

@@ -8,8 +8,6 @@ Traps: a theta method keeps the forces at the end of the last step, so that of a
 steps only the part theta would act; threads of BLAS take longer than matrices of six rows; setters
 of contact points crash where writing into the points works; warnings go to standard output."""
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import json

@@ -1,7 +1,5 @@
 """Claims beyond the paper: periodic attractors exist, as a ball that hops for ever."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

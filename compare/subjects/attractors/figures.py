@@ -1,7 +1,5 @@
 """Beyond the paper: the ball that hops for ever, the branch of such motions, basins."""
 
-from __future__ import annotations
-
 import functools
 from operator import methodcaller
 from typing import Any

@@ -1,7 +1,5 @@
 """The flowmeter (section 5.3): slope, range and hysteresis, unloading, pushes."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import partial

@@ -1,7 +1,5 @@
 """Characteristic curves with settled states, Fig. 13, the fall at unloading; a design."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The flowmeter: slopes of its curve omega_c(omega_0), hysteresis, unloading, pushes."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Laws at every instant, landings, the fluid's drag, the equations of motion (23)-(29)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from functools import partial
 

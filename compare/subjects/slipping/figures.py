@@ -1,7 +1,5 @@
 """Figs. 4 and 5: a ball on the wall is pushed into a slight slip, which dies out or grows."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Stationary states: Propositions 1-6 with their forces, and the diagrams of Figs. 9-11."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from functools import partial

@@ -4,8 +4,6 @@ Flows are the same multiples of sqrt(g/R) for every set. States are measured wit
 and once more with half of it: what that changes belongs to their uncertainty, as does what
 different starts make of the same state."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

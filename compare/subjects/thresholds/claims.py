@@ -1,7 +1,5 @@
 """The bifurcations over omega_0: Table 5, Proposition 7, the branch between attractors."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import partial

@@ -1,7 +1,5 @@
 """Claims about flows that change: pulsation of a rolling ball, jumps, ramps past the fold."""
 
-from __future__ import annotations
-
 import cmath
 import math
 from functools import partial
