@@ -175,12 +175,7 @@ def follow_advice(
 
 
 def _measured(
-    model: Any,
-    data: Any,
-    settled: Rest,
-    step: Advance,
-    tolerances: Tolerances,
-    tell: Tell,
+    model: Any, data: Any, settled: Rest, step: Advance, tolerances: Tolerances, tell: Tell
 ) -> advice.AtRest:
     """The contacts of a settled model and what was measured; `data` is left at its end."""
     model, moving, start = awake(model), settled.moving, copy.copy(data)

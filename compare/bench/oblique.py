@@ -39,10 +39,7 @@ OBLIQUE: list[Callable[[], ContactCase]] = []
 _case = partial(case, OBLIQUE)
 _SPEED = 2.0  # of what is pushed off, m/s
 _PYRAMID = "a pyramid with its edges along the axes"
-_WRONG = {
-    "friction 5 % too weak": {"mu": 0.95 * MU},
-    _PYRAMID: {"pyramid": True},
-}
+_WRONG = {"friction 5 % too weak": {"mu": 0.95 * MU}, _PYRAMID: {"pyramid": True}}
 
 
 def _way(degrees: float) -> Array:

@@ -147,11 +147,7 @@ def awake(model: Any) -> Any:
 
 
 def settle(
-    model: Any,
-    data: Any,
-    limit: float,
-    step: Advance = mujoco.mj_step,
-    tell: Tell = float,
+    model: Any, data: Any, limit: float, step: Advance = mujoco.mj_step, tell: Tell = float
 ) -> Rest:
     """Advance until velocities no longer change, for at most `limit` s; nothing sleeps meanwhile.
 

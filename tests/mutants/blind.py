@@ -5,8 +5,6 @@ are kept in a file that the judge doesn't read. Engines of the study measure; cl
 the right theory and by each wrong one. What came out, whatever it is, becomes a section of
 docs/blind.md."""
 
-from __future__ import annotations
-
 import importlib
 import json
 import math
@@ -206,10 +204,7 @@ def play(
 
 
 def section(
-    seed: int,
-    p: Parameters,
-    said: Sequence[Said],
-    faults: Sequence[tuple[str, Detection]],
+    seed: int, p: Parameters, said: Sequence[Said], faults: Sequence[tuple[str, Detection]]
 ) -> str:
     """What came out, once the key is opened."""
     off = {row.engine: row for row in distribution([e.verdict for e in said]) if not row.quantity}
