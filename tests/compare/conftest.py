@@ -28,6 +28,13 @@ def lacking(_: object) -> None:
     raise GapError("it was not measured")
 
 
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A fresh directory, which is the current one."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
 @pytest.fixture(scope="module")
 def few_figures() -> Iterator[None]:
     """Reports with two figures, of which one was not measured: each is drawn in the tests of

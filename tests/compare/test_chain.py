@@ -51,9 +51,8 @@ def test_numbers_stand_beside_the_theory_that_was_asked():
     assert found[-1].text == "refuted, expected: confirmed"
 
 
-def test_the_command(tmp_path, capsys, monkeypatch):
+def test_the_command(here, capsys):
     """Of claims that are not measured yet, too."""
-    monkeypatch.chdir(tmp_path)
     code, out, _ = carried_out(capsys, "inspect --claim prop-1 --json")
     assert code == 0
     assert [link["what"] for link in json.loads(out)][:3] == ["statement", "source", "measured by"]

@@ -91,11 +91,10 @@ for name in ("analytic", "mjsim", "compare.testing"):
 """
 
 
-def test_a_foreign_model_is_named(tmp_path, monkeypatch):
-    (tmp_path / "model.py").touch()
-    monkeypatch.chdir(tmp_path)
-    said = python("-c", FOREIGN, PYTHONPATH=f"{tmp_path}{os.pathsep}{ROOT}").stdout.splitlines()
-    hides = f"{tmp_path / 'model.py'} hides the package model of dualball: rename"
+def test_a_foreign_model_is_named(here):
+    (here / "model.py").touch()
+    said = python("-c", FOREIGN, PYTHONPATH=f"{here}{os.pathsep}{ROOT}").stdout.splitlines()
+    hides = f"{here / 'model.py'} hides the package model of dualball: rename"
     assert [line.startswith(hides) for line in said] == [True] * 3
     python("-m", "compare", "--version")
 
@@ -120,8 +119,7 @@ def test_a_run_is_described_as_it_is_stored(tmp_path, capsys):
         ("--flow flow.csv", 9),
     ],
 )
-def test_flows(tmp_path, monkeypatch, capsys, flow, last):
-    monkeypatch.chdir(tmp_path)
+def test_flows(here, capsys, flow, last):
     Path("flow.csv").write_text("0, 3\n0.1, 9\n")
     told(capsys, f"simulate --engine event --time 0.3 {flow} -o run.h5")
     assert storage.load("run.h5").header.flow(0.3) == pytest.approx(last)
@@ -173,15 +171,15 @@ def test_attractors_says_what_is_undecided_and_what_it_did_last(capsys, tmp_path
     assert len([row for row in table.splitlines() if row.startswith("|")]) == 1 + 2
 
 
-def test_a_run_that_diverges_is_kept_and_told(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)  # where MuJoCo would leave its MUJOCO_LOG.TXT
+def test_a_run_that_diverges_is_kept_and_told(here, capsys):
     code, _, said = carried_out(capsys, "simulate --start y=1e11 --time 0.1 -o run.h5")
     assert code == 1
     assert re.search(r"diverged by t = .*; its samples so far are kept in run\.failed\.h5", said)
     assert not storage.load("run.failed.h5").complete
-    assert [path.name for path in tmp_path.iterdir()] == ["run.failed.h5"]
+    # MuJoCo would leave its MUJOCO_LOG.TXT beside it
+    assert [path.name for path in here.iterdir()] == ["run.failed.h5"]
     told(capsys, "simulate --time 0.1 -o run.h5")
-    assert [path.name for path in tmp_path.iterdir()] == ["run.h5"]
+    assert [path.name for path in here.iterdir()] == ["run.h5"]
 
 
 @pytest.mark.parametrize(("interval", "block"), [(0.004, 2), (20.0, 8)])
@@ -213,10 +211,7 @@ def test_an_interrupted_run_is_kept(tmp_path, monkeypatch, capsys, interval, blo
     np.testing.assert_array_equal(storage.load(file).x[: len(part.time)], part.x)
 
 
-def test_help_names_every_command_engine_and_option_and_gives_examples_that_are_right(
-    tmp_path, monkeypatch, capsys
-):
-    monkeypatch.chdir(tmp_path)
+def test_help_names_every_command_engine_and_option_and_gives_examples_that_are_right(here, capsys):
     with pytest.raises(SystemExit, match="0"):
         cli.main(["--help"])
     shown = capsys.readouterr().out

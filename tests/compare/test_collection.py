@@ -217,40 +217,38 @@ def test_a_missing_file_is_named_and_an_unknown_quantity_refused(tmp_path):
         measured("settled", "omega_d", 1.0)
 
 
-def test_runs_and_collections_as_tables_and_a_collection_drawn(tmp_path, monkeypatch, capsys):
+def test_runs_and_collections_as_tables_and_a_collection_drawn(here, capsys):
     """What is written has units in its head, and is read again."""
-    monkeypatch.chdir(tmp_path)
-    ran(tmp_path / "runs", [P.replace(omega_0=10.0), P.replace(omega_0=20.0), P])
+    ran(here / "runs", [P.replace(omega_0=10.0), P.replace(omega_0=20.0), P])
     told(capsys, "collect runs -o all.h5 --workers 0")
     told(capsys, "inspect all.h5 --table all.csv --plot curve.svg")
-    head, *rows = csv.reader((tmp_path / "all.csv").read_text("utf-8").splitlines())
+    head, *rows = csv.reader((here / "all.csv").read_text("utf-8").splitlines())
     assert {"run", "omega_0 (rad/s)", "omega_c_uncertainty (rad/s)", "eta", "case"} <= {*head}
-    with reading(tmp_path / "all.h5") as file:
+    with reading(here / "all.h5") as file:
         flows = sorted(dataset(file, "omega_0")[...].tolist())
     assert sorted(float(row[head.index("omega_0 (rad/s)")]) for row in rows) == flows
-    assert "theory" in (tmp_path / "curve.svg").read_text("utf-8")
+    assert "theory" in (here / "curve.svg").read_text("utf-8")
     told(capsys, "simulate --time 0.1 --engine event -o run.h5")
     told(capsys, "inspect run.h5 --table run.csv")
-    head = (tmp_path / "run.csv").read_text("utf-8")
+    head = (here / "run.csv").read_text("utf-8")
     assert head.startswith("time (s),theta (rad),y (m),v_y (m/s)")
     assert_tracks("run.csv", "run.h5", rms=1e-15)
-    ran(tmp_path / "one", [P])
+    ran(here / "one", [P])
     told(capsys, "collect one -o one.h5 --workers 0")
     assert "only a collection in which" in refused(capsys, "inspect one.h5 --plot x.png")
 
 
-def test_commands_write_csv_where_the_name_says_so(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def test_commands_write_csv_where_the_name_says_so(here, monkeypatch, capsys):
     line = "simulate --time 0.1 --engine event -o"
     told(capsys, f"{line} run.h5")
     assert "written to run.CSV" in told(capsys, f"{line} run.CSV")
     assert_tracks("run.CSV", "run.h5", rms=1e-15)
     monkeypatch.setattr("compare.commands.simulate.store", broke_down)
     assert carried_out(capsys, f"{line} run.csv")[2].endswith("are kept in run.failed.csv\n")
-    assert (tmp_path / "run.failed.csv").read_text("utf-8").startswith("time (s),")
-    assert not (tmp_path / "run.csv").exists()
+    assert (here / "run.failed.csv").read_text("utf-8").startswith("time (s),")
+    assert not (here / "run.csv").exists()
 
-    ran(tmp_path / "runs", [P.replace(omega_0=10.0), P.replace(omega_0=20.0)])
+    ran(here / "runs", [P.replace(omega_0=10.0), P.replace(omega_0=20.0)])
     told(capsys, "collect runs -o all.csv --workers 0")
     told(capsys, "collect runs -o all.h5 --workers 0")
     told(capsys, "inspect all.h5 --table again.csv")
@@ -275,11 +273,10 @@ def broke_down(task, path, **_):
     return "broke down"
 
 
-def test_what_has_not_settled_is_ringed(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def test_what_has_not_settled_is_ringed(here, capsys):
     for lasts, ringed in ((2.0, True), (60.0, False)):
         sets = [P.replace(omega_0=omega_0) for omega_0 in (8.0, 10.0)]
-        ran(tmp_path / f"{lasts:g}s", sets, t_end=lasts)
+        ran(here / f"{lasts:g}s", sets, t_end=lasts)
         carried_out(capsys, f"collect {lasts:g}s -o all.h5 --workers 0")
         told(capsys, "inspect all.h5 --plot curve.svg")
         assert ("not settled: 2" in Path("curve.svg").read_text("utf-8")) == ringed

@@ -169,7 +169,7 @@ ABSENT = (
 
 
 @pytest.mark.parametrize(("name", "named", "says"), ABSENT)
-def test_what_is_not_installed_says_what_to_do(name, named, says, tmp_path, monkeypatch, capsys):
+def test_what_is_not_installed_says_what_to_do(name, named, says, here, monkeypatch, capsys):
     asked = ["simulate", "sweep --vary eta=0.1,0.2", "attractors", "validate"]
     if ENGINES[name].missing:  # the league loads engines in processes of their own
         asked.append("league")
@@ -182,16 +182,14 @@ def test_what_is_not_installed_says_what_to_do(name, named, says, tmp_path, monk
     assert ENGINES[name].missing == says
     assert "not installed" in ENGINES[name].versions.values()
     with pytest.raises(InputError, match=says):
-        validate(tmp_path / "results", engine=ENGINES[name])
-    monkeypatch.chdir(tmp_path)
+        validate(here / "results", engine=ENGINES[name])
     for command in asked:
         assert says in refused(capsys, f"{command} --engine {name}")
-    assert not [*tmp_path.iterdir()]
+    assert not [*here.iterdir()]
 
 
-def test_the_torque_of_the_fluid_is_refused_by_all_that_leave_it_out(tmp_path, monkeypatch, capsys):
+def test_the_torque_of_the_fluid_is_refused_by_all_that_leave_it_out(here, capsys):
     """In the words of the command, and before anything is written."""
-    monkeypatch.chdir(tmp_path)
     leave = [name for name, each in ENGINES.items() if not each.torque and not each.missing]
     assert {"event", "mujoco-defaults"} <= {*leave}
     for name in leave:
@@ -199,7 +197,7 @@ def test_the_torque_of_the_fluid_is_refused_by_all_that_leave_it_out(tmp_path, m
             said = refused(capsys, f"{command} --engine {name} --fluid-torque 0.0763")
             if (command, name) != ("attractors --random 1 --time 1", "event"):
                 assert f"fluid_torque = 0.0763 s-1: {name} leaves it out; mujoco, " in said
-    assert not [*tmp_path.iterdir()]
+    assert not [*here.iterdir()]
     p = P.replace(mu=1.0, eta=1.0, fluid_torque=10 / 3)
     for name in (name for name, each in ENGINES.items() if each.torque):
         run = carry_out(task_of(name, p, State(omega_c=0.2 * p.omega_0), 0.5, 2e-3))

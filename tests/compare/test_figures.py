@@ -83,13 +83,12 @@ def test_every_figure_is_drawn_of_theory_alone_and_says_its_parameters(name):
         assert f"{symbol} = " in caption
 
 
-def test_figures_of_a_real_fluid_warn_where_the_model_does_not_hold(tmp_path, monkeypatch, capsys):
+def test_figures_of_a_real_fluid_warn_where_the_model_does_not_hold(here, capsys):
     water, warning = Parameters.named("steel-in-water"), "Warning: the paper's model doesn't hold"
     figure, caption = FIGURES["fig-13-left"].draw(Diagram("fig-13-left", water))
     assert warning in caption
     assert warning in " ".join(figure.get_suptitle().split())
     assert warning not in alone("fig-13-left")[1]
-    monkeypatch.chdir(tmp_path)
     told(capsys, "simulate --set steel-in-water --time 1 --engine event -o run.h5")
     line = "sweep --set steel-in-water --vary omega_0=5,8 --time 1 --engine event --workers 0"
     told(capsys, f"{line} --quiet")

@@ -73,9 +73,7 @@ SCENES = {
         ON_SLOPE, 'integrator="discrete"', 'friction=".6" solref=".01 .7"'
     ),
     "slope, implicitfast, wide impedance": mjcf(
-        ON_SLOPE,
-        f'{ELLIPTIC} integrator="implicitfast"',
-        'friction=".6" solimp=".3 .9 .004 .4 3"',
+        ON_SLOPE, f'{ELLIPTIC} integrator="implicitfast"', 'friction=".6" solimp=".3 .9 .004 .4 3"'
     ),
     "slope, RK4": mjcf(ON_SLOPE, f'{ELLIPTIC} integrator="RK4"'),
     "slope, PGS": mjcf(ON_SLOPE, f'{ELLIPTIC} solver="PGS" iterations="400" tolerance="0"'),
@@ -360,9 +358,8 @@ ADVISED = [name for name in SCENES | DEEP if name != "slope, noslip"]
 @pytest.mark.parametrize(
     "scene", [pytest.param(n, marks=() if n in QUICK else pytest.mark.slow) for n in ADVISED]
 )
-def test_advice_does_what_it_says(scene, tmp_path, monkeypatch):
+def test_advice_does_what_it_says(scene, here):
     """What is to be pasted is an element of MJCF that does the same, and a program that runs."""
-    monkeypatch.chdir(tmp_path)
     model, data, found = settled((SCENES | DEEP)[scene])
     found, after, held = forecast.follow_advice(model, data, found, 10.0)
     assert after
@@ -380,7 +377,7 @@ def test_advice_does_what_it_says(scene, tmp_path, monkeypatch):
     creeps = max(pair.creep for pair in after.pairs) > forecast.Tolerances.creep
     assert bool(found.remedy) == bool(held) == creeps
     if held:
-        (tmp_path / "scene.xml").write_text((SCENES | DEEP)[scene])
+        (here / "scene.xml").write_text((SCENES | DEEP)[scene])
         exec(dict(forecast_page.snippets(found, "scene.xml"))["Python"], names := {})
         assert names["data"].time == names["model"].opt.timestep
     for pair in held.pairs if held else ():

@@ -113,9 +113,8 @@ def test_a_curve_without_any_scatter_has_no_kink(capsys, curve):
         ("1,2\n2,3\n", "curve.csv --set reference", "are for a measured curve, without OTHER"),
     ],
 )
-def test_what_is_no_curve_is_refused(capsys, monkeypatch, tmp_path, text, given, said):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "curve.csv").write_text(text)
+def test_what_is_no_curve_is_refused(capsys, here, text, given, said):
+    (here / "curve.csv").write_text(text)
     assert said in refused(capsys, f"compare curve.csv {given}")
 
 

@@ -178,8 +178,7 @@ def test_files_that_hold_no_motion(tmp_path, name, content, message):
         read(tmp_path / name)
 
 
-def test_two_runs_side_by_side(theory, tmp_path, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_two_runs_side_by_side(theory, here, capsys):
     storage.save(theory, "a.h5")
     storage.save(analytic.simulate(P.replace(omega_0=24.0), [0.0] * 6, 9.0), "b.h5")
     Path("c.csv").write_text(

@@ -109,22 +109,10 @@ def test_a_run_that_breaks_down_is_said_and_takes_no_other_with_it(runner, name,
     [
         (slipping.measure, P.replace(eta=0.0), slipping.FRICTIONLESS),
         (slipping.bounds, P.replace(eta=0.0), slipping.FRICTIONLESS),
-        (
-            unsteady.pulsation,
-            ROUGH,
-            "no flow at which two-point rolling ends by slipping",
-        ),
-        (
-            unsteady.jumps,
-            ROUGH,
-            "no flows between which the ball slips at both points",
-        ),
+        (unsteady.pulsation, ROUGH, "no flow at which two-point rolling ends by slipping"),
+        (unsteady.jumps, ROUGH, "no flows between which the ball slips at both points"),
         (thresholds.measure, P, "ends two-point rolling"),
-        (
-            flowmeter.hysteresis,
-            THICK,
-            "no flow at which SS gives way to NR",
-        ),
+        (flowmeter.hysteresis, THICK, "no flow at which SS gives way to NR"),
     ],
 )
 def test_what_is_not_there_is_said(runner, measure, p, said):

@@ -117,12 +117,11 @@ def test_a_run_is_shown_between_its_samples(run):
         ),
     ],
 )
-def test_what_cannot_be_shown(run, tmp_path, monkeypatch, name, options, message):
-    monkeypatch.chdir(tmp_path)
+def test_what_cannot_be_shown(run, here, monkeypatch, name, options, message):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(InputError, match=message):
         page.save(run, Path(name), **options)
-    assert not list(tmp_path.iterdir())
+    assert not list(here.iterdir())
 
 
 @contextmanager

@@ -63,17 +63,16 @@ def test_engines_that_are_none(engine, says):
     assert says in str(refused.value)
 
 
-def test_an_adapter_that_gives_nothing_loses_all_cases(tmp_path, monkeypatch, capsys):
+def test_an_adapter_that_gives_nothing_loses_all_cases(here, monkeypatch, capsys):
     """It has its page all the same."""
     functions = "build = lambda case, timestep: None; step = lambda n: None; state = lambda: 1 / 0"
     note = "NOTE = 'what is told of another case'"
-    (tmp_path / "mine.py").write_text(f"{note}; {functions}")
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(tmp_path)
+    (here / "mine.py").write_text(f"{note}; {functions}")
+    monkeypatch.syspath_prepend(here)
     shown = told(capsys, "league --engine mine --quick --quiet -o out --workers 1")
     assert re.search(r"mine +f64 +0 of \d\d lost lost lost lost", shown)
     assert "The shortest step is 2 ms." in shown
-    page = (tmp_path / "out" / "league.html").read_text("utf-8")
+    page = (here / "out" / "league.html").read_text("utf-8")
     assert "lost" in page
     assert re.search(r"Worst: .*\. Known for: what is told of another case\.", page)
 

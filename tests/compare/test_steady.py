@@ -32,8 +32,7 @@ def test_what_is_proposed_is_enough():
         assert means[2] == pytest.approx(each.omega_0, rel=steady.DRIFT)
 
 
-def test_a_sweep_that_is_too_short_says_so(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def test_a_sweep_that_is_too_short_says_so(here, capsys):
     line = "sweep --set steel-in-water --vary omega_0=5,8 --engine event --workers 0 --quiet"
     code, _, said = carried_out(capsys, line)
     assert (code, said.count("\n")) == (0, 2)
