@@ -27,8 +27,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """What numba takes longest to compile comes first, runs of theory, and in the middle, Coulomb's
     law in MuJoCo.
 
-    Two workers begin there: each compiles what the other one then loads.
-    """
+    Two workers begin there: each compiles what the other one then loads."""
     first = ("test_many_runs", "test_orbits", "test_basins", "test_figures")
     theory = [item for item in items if item.path.stem in first]
     coulomb = [item for item in items if item.path.stem.startswith("test_coulomb")]

@@ -15,8 +15,7 @@ def random_start(seed: int, on_wall: bool = False) -> tuple[Parameters, State]:
     """mu 0.03-3, eta 0.03-2, j 0.1-0.66, r/R 0.05-0.6, kappa 0.01-3, Omega_0 0.3-6; on the floor or
     up to R above it.
 
-    One ball in five starts off the wall, unless `on_wall`.
-    """
+    One ball in five starts off the wall, unless `on_wall`."""
     rng = np.random.default_rng([77, seed])
 
     def log_uniform(low: float, high: float) -> float:

@@ -35,8 +35,7 @@ class Parser(argparse.ArgumentParser):
     """Raises `InputError`, one line, where argparse would print the usage and exit, and for an
     output that is read.
 
-    Options are written in full.
-    """
+    Options are written in full."""
 
     def __init__(self, **given: Any) -> None:
         super().__init__(allow_abbrev=False, **given)

@@ -254,8 +254,7 @@ def serve(p: Parameters, port: int, show: bool) -> None:
     set `p` at first.
 
     Raises `InputError` if NiceGUI, an extra, isn't installed, the port is in use, or too few files
-    may be open.
-    """
+    may be open."""
     try:
         from nicegui import app, ui
         from starlette.middleware.trustedhost import TrustedHostMiddleware

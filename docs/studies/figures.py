@@ -80,8 +80,7 @@ def _contact(axes: Axes, contact: Contact, at: tuple[float, float], along: tuple
 def draw_3() -> Figure:
     """Fig. 3, sections of the state space.
 
-    Left: y = v_y = 0 at one omega_c, over the three slips. Right: y = v_y = slip_z = 0.
-    """
+    Left: y = v_y = 0 at one omega_c, over the three slips. Right: y = v_y = slip_z = 0."""
     figure = style.figure(9.0, 4.3)
     left: Any = figure.add_subplot(1, 2, 1, projection="3d")
     right: Any = figure.add_subplot(1, 2, 2, projection="3d")

@@ -1,8 +1,7 @@
 """Write the tables on Coulomb's law: ``python -m docs.studies.friction docs/friction.md``, and
 ``docs/records/law.md``.
 
-All take some ten minutes.
-"""
+All take some ten minutes."""
 
 import copy
 import itertools

@@ -1,8 +1,7 @@
 """Genesis beside Coulomb's law: ``python -m docs.studies.genesis docs/records/league.md``.
 
 It needs Genesis, which needs PyTorch: ``pip install -e . genesis-world torch``. Scenes and what is
-measured are those of `docs.studies.friction`.
-"""
+measured are those of `docs.studies.friction`."""
 
 from __future__ import annotations
 

@@ -1,7 +1,6 @@
 """Scenes of robots that others wrote, each with the package it comes from; no window is opened.
 
-Each is a function of a `Way`, which steps it and returns what was `Found`.
-"""
+Each is a function of a `Way`, which steps it and returns what was `Found`."""
 
 import functools
 import math

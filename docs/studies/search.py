@@ -104,8 +104,7 @@ def screen(p: Parameters, x0s: npt.ArrayLike) -> tuple[npt.NDArray[np.bool_], Ar
     """Which of the starts (n, 8) still hop after 60/c; their states then (n, 8); how many runs
     failed.
 
-    One thread; p.c must be positive.
-    """
+    One thread; p.c must be positive."""
     lasts, quiet = DURATION / p.c, QUIET / p.c
     runs = simulate_many(p, x0s, lasts, sample_interval=quiet / LOOKS, quiet=quiet, threads=1)
     failed = np.array([bool(each) for each in runs.failure])

@@ -1,7 +1,6 @@
 """Small scenes of what users of MuJoCo build, that need no package but MuJoCo.
 
-Each is a function of a `Way`, which steps it and returns what was `Found`.
-"""
+Each is a function of a `Way`, which steps it and returns what was `Found`."""
 
 import itertools
 import math

@@ -1,8 +1,7 @@
 """Forecasts of contacts stand beside what MuJoCo does in small scenes, and their advice does what
 it says.
 
-Settings of an MJCF file reach the engine of the league as MuJoCo itself reads them.
-"""
+Settings of an MJCF file reach the engine of the league as MuJoCo itself reads them."""
 
 import itertools
 import json

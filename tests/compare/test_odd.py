@@ -188,8 +188,7 @@ def carried_out(words: list[str], criteria: float) -> tuple[int, str, str]:
     """The exit code of a line, what it prints and says of trouble; Ctrl-C comes after so many
     seconds, if need be.
 
-    Raises `TimeoutError` if it doesn't end then within 10 s of processor time.
-    """
+    Raises `TimeoutError` if it doesn't end then within 10 s of processor time."""
     pressed = list[float]()
 
     def press(number: int, frame: object) -> None:

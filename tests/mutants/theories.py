@@ -1,7 +1,6 @@
 """Wrong theories: each has one fault of the size that slips into a derivation or a program.
 
-Most change the answer of the right function, or the parameters of the ball it is given.
-"""
+Most change the answer of the right function, or the parameters of the ball it is given."""
 
 import functools
 from collections.abc import Callable, Mapping
