@@ -16,13 +16,14 @@ from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
+from numba.extending import register_jitable
 
 from mjsim import recorder, scene
 from mjsim.contact_settings import LANDING_PARTS, ContactModel, RigidContacts
 from mjsim.coulomb import Coulomb
 from mjsim.coulomb.compiling import entry
 from mjsim.coulomb.engine import mj_step, models
-from mjsim.mid_step import BallConstants, Velocity, mid_step_forces
+from mjsim.mid_step import BallConstants, Velocity, mid_step_forces, resistance
 from mjsim.recorder import COORDINATES, NSENSOR, SENSORS
 from model import Parameters, State
 from model.arrays import Array
@@ -38,6 +39,8 @@ SHARE = 1e-6
 """`share` of the law: part of gravity to which the slip of contacts must be predicted."""
 _NORMAL_A, _NORMAL_B = recorder.NORMALS
 _SLIP_A, _, _SLIP_B, _ = recorder.SLIPS
+for _plain in (resistance, mid_step_forces):
+    register_jitable(_plain)
 
 
 class Joints(NamedTuple):
@@ -69,6 +72,7 @@ class Joints(NamedTuple):
     """Addresses in the engine."""
 
 
+@register_jitable
 def spin_axes(turned: Any) -> tuple[tuple[float, float, float], ...]:
     """The ball's axes along the paper's, as the rows of a matrix, from a quaternion."""
     w, a, b, c = float(turned[0]), float(turned[1]), float(turned[2]), float(turned[3])
@@ -79,6 +83,7 @@ def spin_axes(turned: Any) -> tuple[tuple[float, float, float], ...]:
     )
 
 
+@register_jitable
 def velocity_of(body: Joints) -> Velocity:
     """The velocities of the joints, the spin's along the paper's axes."""
     v, (x, y, z) = body.qvel, spin_axes(body.qpos[3:])
@@ -90,6 +95,7 @@ def velocity_of(body: Joints) -> Velocity:
     )  # fmt: skip
 
 
+@register_jitable
 def lands(body: Joints) -> bool:
     """Whether the ball comes to touch floor or wall in the next step, faster than by the fall of a
     part of it; or has done so, and slips slowly. Notes how it slips."""
@@ -107,6 +113,7 @@ def lands(body: Joints) -> bool:
     return lands or (slow and body.landed[0] > 0)
 
 
+@register_jitable
 def stop_landing(body: Joints) -> None:
     """Stop a ball where it touches floor or wall, if it would overlap what it didn't touch in the
     last step, so that one step has all of the impact."""
@@ -115,6 +122,7 @@ def stop_landing(body: Joints) -> None:
             body.qpos[i] = 0.0
 
 
+@register_jitable
 def take_step(body: Joints, step: float, omega_0: float) -> None:
     """Take a step of so many seconds."""
     qpos, applied, last, v = body.qpos, body.applied, body.last, velocity_of(body)
@@ -137,6 +145,7 @@ def take_step(body: Joints, step: float, omega_0: float) -> None:
         last[i] = v[i]
 
 
+@register_jitable
 def change_step(body: Joints, old: float, new: float) -> None:
     """Go on in steps of another length, s: places stay ahead by the same part of a step, and
     margins are what a fall makes in one."""
@@ -150,6 +159,7 @@ def change_step(body: Joints, old: float, new: float) -> None:
     models(body.model, 1)[0].opt.timestep = new
 
 
+@register_jitable
 def parts(body: Joints) -> int:
     """In how many steps one is divided: a power of two, so that the ball has `_NEAR` of them to go
     to the axis; `LANDING_PARTS` where it lands; else 1."""

@@ -5,9 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import gc
 import hashlib
-import inspect
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -23,7 +21,7 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.types.functions import ExternalFunction
 from numba.experimental.function_type import _get_wrapper_address
-from numba.extending import intrinsic, register_jitable
+from numba.extending import intrinsic
 from numba.np import linalg
 
 
@@ -90,12 +88,10 @@ def view(function: Any) -> Any:
 def entry(function: Any) -> Any:
     """A decorator: compile a function that Python calls, at its first call, and keep it on disk.
 
-    So are the plain functions of its package that it calls, which must be known above it. Numba
+    What it calls is a `kernel`, or a plain function that numba knows by `register_jitable`. Numba
     compiles it again when its own file has changed; that its name holds the digest of all sources
     makes it do so, too, when what it calls has changed. One process compiles at a time.
     """
-    for each in _called(function):
-        _register(each)
     folders = {Path(__file__).parent, Path(function.__code__.co_filename).parent}
     function.__qualname__ += f"_{_digest(frozenset(folders))}"
     try:
@@ -112,21 +108,6 @@ def entry(function: Any) -> Any:
 
     call.dispatcher = dispatcher  # type: ignore[attr-defined]
     return call
-
-
-_register = functools.cache(register_jitable)
-
-
-def _called(function: Any) -> set[Any]:
-    """The plain functions of its package that a function calls, and those that they call."""
-    package = function.__module__.rpartition(".")[0]
-    names = map(function.__globals__.get, function.__code__.co_names)
-    own = {
-        each
-        for each in names
-        if inspect.isfunction(each) and each.__module__.startswith(f"{package}.")
-    }
-    return own.union(*map(_called, own))
 
 
 @functools.cache
@@ -148,14 +129,8 @@ def c_address(call: Any) -> int:
 
 @contextlib.contextmanager
 def _alone(function: Any) -> Iterator[None]:
-    """Within this no other process compiles: those that wait take what this one keeps on disk.
-
-    Nor is garbage looked for, which takes a fifth of the time.
-    """
+    """Within this no other process compiles: those that wait take what this one keeps on disk."""
     with contextlib.ExitStack() as stack:
-        if gc.isenabled():
-            gc.disable()
-            stack.callback(gc.enable)
         # no such locks here, or no place for a cache
         with contextlib.suppress(ImportError, OSError, TypeError):
             import fcntl
