@@ -39,8 +39,6 @@ SHARE = 1e-6
 """`share` of the law: part of gravity to which the slip of contacts must be predicted."""
 _NORMAL_A, _NORMAL_B = recorder.NORMALS
 _SLIP_A, _, _SLIP_B, _ = recorder.SLIPS
-for _plain in (resistance, mid_step_forces):
-    register_jitable(_plain)
 
 
 class Joints(NamedTuple):
@@ -72,7 +70,6 @@ class Joints(NamedTuple):
     """Addresses in the engine."""
 
 
-@register_jitable
 def spin_axes(turned: Any) -> tuple[tuple[float, float, float], ...]:
     """The ball's axes along the paper's, as the rows of a matrix, from a quaternion."""
     w, a, b, c = float(turned[0]), float(turned[1]), float(turned[2]), float(turned[3])
@@ -83,7 +80,6 @@ def spin_axes(turned: Any) -> tuple[tuple[float, float, float], ...]:
     )
 
 
-@register_jitable
 def velocity_of(body: Joints) -> Velocity:
     """The velocities of the joints, the spin's along the paper's axes."""
     v, (x, y, z) = body.qvel, spin_axes(body.qpos[3:])
@@ -95,7 +91,6 @@ def velocity_of(body: Joints) -> Velocity:
     )  # fmt: skip
 
 
-@register_jitable
 def lands(body: Joints) -> bool:
     """Whether the ball comes to touch floor or wall in the next step, faster than by the fall of a
     part of it; or has done so, and slips slowly. Notes how it slips."""
@@ -113,7 +108,6 @@ def lands(body: Joints) -> bool:
     return lands or (slow and body.landed[0] > 0)
 
 
-@register_jitable
 def stop_landing(body: Joints) -> None:
     """Stop a ball where it touches floor or wall, if it would overlap what it didn't touch in the
     last step, so that one step has all of the impact."""
@@ -122,7 +116,6 @@ def stop_landing(body: Joints) -> None:
             body.qpos[i] = 0.0
 
 
-@register_jitable
 def take_step(body: Joints, step: float, omega_0: float) -> None:
     """Take a step of so many seconds."""
     qpos, applied, last, v = body.qpos, body.applied, body.last, velocity_of(body)
@@ -145,7 +138,6 @@ def take_step(body: Joints, step: float, omega_0: float) -> None:
         last[i] = v[i]
 
 
-@register_jitable
 def change_step(body: Joints, old: float, new: float) -> None:
     """Go on in steps of another length, s: places stay ahead by the same part of a step, and
     margins are what a fall makes in one."""
@@ -159,7 +151,6 @@ def change_step(body: Joints, old: float, new: float) -> None:
     models(body.model, 1)[0].opt.timestep = new
 
 
-@register_jitable
 def parts(body: Joints) -> int:
     """In how many steps one is divided: a power of two, so that the ball has `_NEAR` of them to go
     to the axis; `LANDING_PARTS` where it lands; else 1."""
@@ -172,6 +163,11 @@ def parts(body: Joints) -> int:
     while count * nearest < way and count <= _MOST:
         count *= 2
     return count
+
+
+_OURS: Any = spin_axes, velocity_of, lands, stop_landing, take_step, change_step, parts
+for _plain in (*_OURS, mid_step_forces, resistance):
+    register_jitable(_plain)
 
 
 @entry

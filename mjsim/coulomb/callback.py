@@ -19,7 +19,7 @@ from .compiling import address_of, c_address, call, entry, kernel
 from .engine import LIBRARY, array_at, datas, models, words
 from .memory import Simulation, memories
 from .rigid import take_dampers_away
-from .step import conclude, law_of_a_step, store
+from .step import conclude, keep_forces, law_of_a_step, store
 
 _SLOT = ctypes.c_void_p.in_dll(LIBRARY, "mjcb_control")
 
@@ -90,7 +90,8 @@ def finish(m: int, d: int, at: int, storing: bool) -> None:
     conclude(model, data, memory)
     take_dampers_away(model, data, memory)
     if storing and not memory.stored:  # what goes on from here does as what is restored
-        store(model, data, memory, True)
+        keep_forces(memory)
+        store(model, data, memory)
         memory.stored, memory.ncon = 1, -1
 
 

@@ -232,7 +232,7 @@ def place_on_bodies(model: Any, data: Any, contact: Any, given: Any) -> None:
 def clear(contact: Any) -> None:
     """Make it a new contact, of which nothing is known."""
     contact.state, contact.lift, contact.load = NEW, 0.0, 0.0
-    contact.predicted, contact.found, contact.extrapolated = 0.0, 0.0, 0.0
+    contact.predicted, contact.extrapolated = 0.0, 0.0
     contact.shortfall, contact.bias, contact.error, contact.weakened = 0.0, 0.0, 0.0, 0
     for axis in range(3):
         contact.velocity[axis] = contact.turned[axis] = 0.0

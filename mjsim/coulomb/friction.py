@@ -14,9 +14,18 @@ from typing import Any
 from .compiling import kernel
 from .contacts import axis_of, kind_of
 from .engine import engine_contacts, reals
-from .memory import NEW, OPEN, SLIDES, STICKS, contacts_of, dry_of, rows_of
+from .memory import (
+    NEW,
+    OPEN,
+    SLIDES,
+    STICKS,
+    contacts_of,
+    dry_of,
+    dry_rows_of,
+    rows_of_contact,
+)
 from .parameters import FEEDBACK, SLOWEST, STEADIER
-from .rows import multiply
+from .rows import find_residuals
 
 # -- static and kinetic ----------------------------------------------------------------------------
 
@@ -26,8 +35,7 @@ def strengthen(data: Any, memory: Any) -> None:
     """Give contacts their static friction back, if they are the very ones that were weakened."""
     contacts, found = contacts_of(memory), engine_contacts(data.contact, data.ncon)
     for i in range(memory.contacts if memory.ncon == data.ncon else 0):
-        contact = contacts[i]
-        given = found[contact.index]
+        contact, given = contacts[i], found[contacts[i].index]
         if contact.weakened and given.friction[0] == contact.mu[0] and given.mu == contact.cone:
             scale(contact, given, 1 / memory.law.kinetic)
 
@@ -40,17 +48,15 @@ def weaken(model: Any, data: Any, memory: Any) -> None:
     What sticks gives way in a step in which its friction changes, by h R mu f_n at most; f_n is a
     weight at least, since others may bear it. Faster than that it begins to slide.
     """
-    contacts, found = contacts_of(memory), engine_contacts(data.contact, data.ncon)
-    rows, velocity = rows_of(memory), reals(data.efc_vel, data.nefc)
-    estimate = reals(data.efc_diagA, data.nefc)
-    for i in range(memory.contacts):
-        contact, square, gives_way = contacts[i], 0.0, SLOWEST * memory.gravity
-        load = max(rows[contact.address].remembered, memory.gravity / estimate[contact.address])
+    found = engine_contacts(data.contact, data.ncon)
+    velocity, estimate = reals(data.efc_vel, data.nefc), reals(data.efc_diagA, data.nefc)
+    for contact in contacts_of(memory):
+        rows, square, gives_way = rows_of_contact(memory, contact), 0.0, SLOWEST * memory.gravity
+        load = max(rows[0].remembered, memory.gravity / estimate[contact.address])
         for t in range(2 if contact.dim > 1 else 0):
-            row = rows[contact.address + 1 + t]
             square += velocity[contact.address + 1 + t] ** 2
             if not contact.weakened:
-                gives_way = max(gives_way, row.R * contact.mu[t] * load)
+                gives_way = max(gives_way, rows[1 + t].R * contact.mu[t] * load)
         slides = contact.state != STICKS and square > (model.opt.timestep * gives_way) ** 2
         contact.weakened = slides
         scale(contact, found[contact.index], memory.law.kinetic if slides else 1.0)
@@ -71,62 +77,57 @@ def scale(contact: Any, given: Any, factor: float) -> None:
 
 @kernel
 def project(rows: Any, contact: Any) -> int:
-    """Set a contact's forces: -residual / R, projected onto its cone; return its state.
+    """Set the forces of a contact's rows: -residual / R, projected onto its cone; return its state.
 
     This is what MuJoCo's solver has (computation chapter, elliptic cone).
     """
-    normal, square = rows[contact.address], 0.0
+    normal, square = rows[0], 0.0
     if contact.dim == 1:
         normal.force = max(-normal.residual / normal.R, 0.0)
         return STICKS if normal.force > 0 else OPEN
     along = contact.cone * normal.residual
     for t in range(contact.dim - 1):
-        square += (contact.mu[t] * rows[contact.address + 1 + t].residual) ** 2
+        square += (contact.mu[t] * rows[1 + t].residual) ** 2
     across = math.sqrt(square)
     if along >= contact.cone * across:
-        for r in range(contact.address, contact.address + contact.dim):
-            rows[r].force = 0.0
+        for row in rows:
+            row.force = 0.0
         return OPEN
     if contact.cone * along + across <= 0:
-        for r in range(contact.address, contact.address + contact.dim):
-            rows[r].force = -rows[r].residual / rows[r].R
+        for row in rows:
+            row.force = -row.residual / row.R
         return STICKS
     normal.force = (contact.cone * across - along) / (
         normal.R * contact.cone * (1 + contact.cone * contact.cone)
     )
     for t in range(contact.dim - 1):
-        row = rows[contact.address + 1 + t]
-        row.force = -normal.force / across * contact.mu[t] ** 2 * row.residual
+        rows[1 + t].force = -normal.force / across * contact.mu[t] ** 2 * rows[1 + t].residual
     return SLIDES
 
 
 @kernel
 def find_forces(model: Any, data: Any, memory: Any) -> float:
     """Find forces, states and slip from the accelerations; how wrong a prediction was, m s-2."""
-    contacts, rows, worst = contacts_of(memory), rows_of(memory), 0.0
-    multiply(memory, reals(data.qacc, model.nv))
-    for r in range(len(rows)):
-        rows[r].residual -= rows[r].reference + rows[r].R * rows[r].held
-    for i in range(memory.contacts):
-        contact = contacts[i]
-        normal = rows[contact.address]
+    worst = 0.0
+    find_residuals(memory, reals(data.qacc, model.nv), True)
+    for contact in contacts_of(memory):
+        rows = rows_of_contact(memory, contact)
+        normal = rows[0]
         normal.residual += contact.predicted
-        state = project(rows, contact)
-        slip = shift(rows, contact) if state != STICKS else 0.0
+        contact.state = project(rows, contact)
+        slip = shift(rows, contact) if contact.state != STICKS else 0.0
         contact.error = abs(slip - contact.predicted)
-        if state == OPEN:  # its slip matters if without it the contact would have closed
+        if contact.state == OPEN:  # its slip matters if without it the contact would have closed
             approach = normal.residual + normal.R * normal.held - contact.predicted
             contact.error = contact.error if approach < 0 else 0.0
         if memory.law.rigid:
-            for r in range(contact.address, contact.address + contact.dim):
-                off = abs(rows[r].R * (rows[r].force - rows[r].remembered))
-                contact.error = max(contact.error, off)
-        contact.state, contact.found = state, slip
+            for row in rows:
+                contact.error = max(contact.error, abs(row.R * (row.force - row.remembered)))
         worst = max(worst, contact.error)
+        contact.predicted = slip
         learn(memory, contact)
-    for r in range(memory.first_dry, memory.first_dry + memory.dry):
-        dry = rows[r]
-        dry.force = min(max(-dry.residual / dry.R, -dry.limit), dry.limit)
+    for row in dry_rows_of(memory):
+        row.force = min(max(-row.residual / row.R, -row.limit), row.limit)
     return worst
 
 
@@ -137,35 +138,27 @@ def learn(memory: Any, contact: Any) -> None:
     if not memory.law.rigid or contact.state != SLIDES or contact.extrapolated < 0:
         contact.bias, contact.shortfall = 0.0, 0.0
         return
-    predicted = max(contact.extrapolated + contact.bias, 0.0)
-    contact.error = max(contact.error, abs(contact.found - predicted))
-    before, contact.shortfall = contact.shortfall, contact.found - contact.extrapolated
+    expected, found = max(contact.extrapolated + contact.bias, 0.0), contact.predicted
+    contact.error = max(contact.error, abs(found - expected))
+    before, contact.shortfall = contact.shortfall, found - contact.extrapolated
     most = min(abs(before), abs(contact.shortfall)) if before * contact.shortfall > 0 else 0.0
     contact.bias = min(max((contact.bias + contact.shortfall) / 2, -most), most)
 
 
 @kernel
-def store_forces(memory: Any, found: bool) -> None:
-    """Store what contacts bear, in the axes of their geoms: forces found, or remembered before."""
-    contacts, rows = contacts_of(memory), rows_of(memory)
-    for i in range(memory.contacts):
-        contact = contacts[i]
-        row = rows[contact.address]
-        contact.load = row.force if found else row.remembered
-        for side in range(2):
-            for axis in range(3):
-                contact.friction[side, axis, 0] = contact.friction[side, axis, 1] = 0.0
+def store_forces(memory: Any) -> None:
+    """Store the forces that rows remember, in the axes of geoms."""
+    for contact in contacts_of(memory):
+        rows = rows_of_contact(memory, contact)
+        contact.load = rows[0].remembered
         for t in range(contact.dim - 1):
-            row = rows[contact.address + 1 + t]
-            force = row.force if found else row.remembered
             for side in range(2):
                 for axis in range(3):
                     along = contact.axes[side, axis, axis_of(t)]
-                    contact.friction[side, axis, kind_of(t)] += along * force
-    dry = dry_of(memory, memory.dry)
-    for i in range(memory.dry):
-        row = rows[memory.first_dry + i]
-        dry[i] = row.force if found else row.remembered
+                    contact.friction[side, axis, kind_of(t)] += along * rows[1 + t].remembered
+    dry, rows = dry_of(memory, memory.dry), dry_rows_of(memory)
+    for i in range(len(dry)):
+        dry[i] = rows[i].remembered
 
 
 # -- slip ------------------------------------------------------------------------------------------
@@ -176,7 +169,7 @@ def shift(rows: Any, contact: Any) -> float:
     """De Saxcé's shift: the coefficients of friction times the slip of a contact, m s-2."""
     square = 0.0
     for t in range(contact.dim - 1):
-        row = rows[contact.address + 1 + t]
+        row = rows[1 + t]
         square += (contact.mu[t] * (row.residual + row.R * row.force)) ** 2
     return math.sqrt(square)
 
@@ -190,28 +183,18 @@ def feedback(contact: Any, estimate: Any) -> float:
 
 
 @kernel
-def subtract_references(memory: Any) -> None:
-    """Take the reference accelerations of contacts off their residuals."""
-    rows = rows_of(memory)
-    for r in range(len(rows)):
-        rows[r].residual -= rows[r].reference
-        rows[r].force = 0.0
-
-
-@kernel
 def predict_slip(model: Any, data: Any, memory: Any) -> bool:
     """Predict slip, as if accelerations stayed those of the last step; whether that is in doubt."""
-    contacts, rows, doubt = contacts_of(memory), rows_of(memory), False
-    rigid, estimate = memory.law.rigid, reals(data.efc_diagA, data.nefc)
-    subtract_references(memory)
-    for i in range(memory.contacts):
-        contact = contacts[i]
-        slip, normal = shift(rows, contact), rows[contact.address].residual
+    doubt, rigid, estimate = False, memory.law.rigid, reals(data.efc_diagA, data.nefc)
+    find_residuals(memory, reals(data.qacc, model.nv), False)
+    for contact in contacts_of(memory):
+        rows = rows_of_contact(memory, contact)
+        slip, normal = shift(rows, contact), rows[0].residual
         contact.predicted, contact.extrapolated = slip, -1.0
         if contact.state == NEW or contact.state == OPEN:
             doubt |= normal < 0 and (rigid or slip > memory.enough)
             continue
-        if contact.state == STICKS or power(rows, contact) >= 0:  # it stops
+        if contact.state == STICKS or power(rows) >= 0:  # it stops
             contact.predicted = 0.0
             doubt |= slip > memory.enough and not would_hold(rows, contact, estimate)
         else:
@@ -229,19 +212,17 @@ def predict_slip(model: Any, data: Any, memory: Any) -> bool:
 def extrapolate_slip(model: Any, data: Any, memory: Any) -> None:
     """Find what would have been predicted of a step that was solved: the next one need not be, if
     that was right."""
-    contacts, rows = contacts_of(memory), rows_of(memory)
-    multiply(memory, reals(data.qacc, model.nv))
-    subtract_references(memory)
-    for i in range(memory.contacts):
-        contacts[i].extrapolated = shift(rows, contacts[i])
+    find_residuals(memory, reals(data.qacc, model.nv), False)
+    for contact in contacts_of(memory):
+        contact.extrapolated = shift(rows_of_contact(memory, contact), contact)
 
 
 @kernel
-def power(rows: Any, contact: Any) -> float:
-    """Friction that is remembered times what it is asked to give way to; negative while it
+def power(rows: Any) -> float:
+    """Friction that a contact remembers times what it is asked to give way to; negative while it
     slides."""
     total = 0.0
-    for r in range(contact.address + 1, contact.address + contact.dim):
+    for r in range(1, len(rows)):
         total += rows[r].remembered * rows[r].residual
     return total
 
@@ -251,7 +232,7 @@ def would_hold(rows: Any, contact: Any, estimate: Any) -> bool:
     """Whether a contact would stick: the forces for it, from it alone, are within the cone."""
     load, square = 0.0, 0.0
     for k in range(contact.dim):
-        row = rows[contact.address + k]
+        row = rows[k]
         lacks = row.residual + row.R * (row.remembered - row.held)
         force = row.remembered - lacks / (estimate[contact.address + k] + row.R)
         if k == 0:

@@ -51,8 +51,7 @@ CONTACT = np.dtype(
         ("belt", _f8),  # how fast its surfaces move on their bodies at most, m s-1
         ("lift", _f8),  # distance that Baumgarte stabilisation holds, m
         # De Saxcé's shift, the coefficient of friction times the slip, m s-2
-        ("predicted", _f8),
-        ("found", _f8),
+        ("predicted", _f8),  # before the step; then what it came to
         ("extrapolated", _f8),  # as if accelerations stayed those of the last step; -1: not known
         ("shortfall", _f8),  # by how much that was too little in the last step
         ("bias", _f8),  # what to add to it: half of that and half of what was added, at most that
@@ -102,9 +101,7 @@ ROW = np.dtype(
         ("reference", _f8),  # acceleration it asks for without memory and shift, m s-2
         ("remembered", _f8),  # force of the step before, or of the last solution of this one, N
         ("held", _f8),  # the part of it that it keeps without giving way, N
-        # m s-2, first J qacc (`multiply`), then less the reference (`subtract_references`); in
-        # Newton's method and `find_forces` also less R times what is held
-        ("residual", _f8),
+        ("residual", _f8),  # by `find_residuals`, m s-2
         ("force", _f8),  # as found, N
         # minus its derivatives by the residuals of the rows of its unit, kg, in Newton's method
         ("stiffness", _f8, MOST_ROWS),
@@ -113,6 +110,7 @@ ROW = np.dtype(
     align=True,
 )
 """A constraint row, of the same number as in mjData."""
+_ROW_SIZE = ROW.itemsize
 
 DOF = np.dtype(
     [
@@ -203,6 +201,30 @@ def contacts_of(memory: Any) -> Any:
 def rows_of(memory: Any) -> Any:
     """All constraint rows."""
     return rows_at(memory.row_at, memory.rows)
+
+
+@view
+def some_rows(memory: Any, first: int, count: int) -> Any:
+    """So many rows, one after the other."""
+    return rows_at(memory.row_at + _ROW_SIZE * first, count)
+
+
+@view
+def rows_of_contact(memory: Any, contact: Any) -> Any:
+    """The rows of a contact: of its normal force, then of its friction."""
+    return some_rows(memory, contact.address, contact.dim)
+
+
+@view
+def rows_of_unit(memory: Any, first: int) -> Any:
+    """The rows of a unit that begins with this one."""
+    return some_rows(memory, first, rows_of(memory)[first].dim)
+
+
+@view
+def dry_rows_of(memory: Any) -> Any:
+    """The rows of dry friction."""
+    return some_rows(memory, memory.first_dry, memory.dry)
 
 
 @view

@@ -32,7 +32,8 @@ from .memory import (
     dofs_of,
     jacobians_of,
     places_of,
-    rows_of,
+    rows_of_contact,
+    rows_of_unit,
     units_of,
 )
 from .parameters import (
@@ -49,26 +50,26 @@ from .parameters import (
     SHORTEST,
     STEPS,
 )
-from .rows import times
+from .rows import find_residuals, hold
 
 # -- forces and their derivatives ------------------------------------------------------------------
 
 
 @kernel
 def contact_forces(rows: Any, contact: Any) -> int:
-    """Set a contact's forces from its residuals, by Coulomb's law; return its state."""
-    first, square = contact.address, 0.0
-    load = max(-rows[first].residual / rows[first].R, 0.0)
+    """Set the forces of a contact's rows from their residuals, by Coulomb's law; return its
+    state."""
+    square, load = 0.0, max(-rows[0].residual / rows[0].R, 0.0)
     for t in range(contact.dim - 1):
-        row = rows[first + 1 + t]
+        row = rows[1 + t]
         row.force = -row.residual / row.R
         square += (row.force / contact.mu[t]) ** 2
-    rows[first].force, contact.share = load, 1.0
+    rows[0].force, contact.share = load, 1.0
     if load > 0 and square <= load * load:
         return STICKS
     contact.share = load / math.sqrt(square) if square > 0 else 0.0
     for t in range(contact.dim - 1):
-        rows[first + 1 + t].force *= contact.share
+        rows[1 + t].force *= contact.share
     return SLIDES if load > 0 else OPEN
 
 
@@ -84,7 +85,7 @@ def row_force(row: Any) -> float:
 @kernel
 def stiffness(rows: Any, contact: Any, r: int, s: int) -> float:
     """Minus the derivative of force r of a closed contact by its residual s, kg."""
-    load, row, other = rows[contact.address], rows[contact.address + r], rows[contact.address + s]
+    load, row, other = rows[0], rows[r], rows[s]
     own = 1 / row.R if r == s else 0.0
     if contact.state != SLIDES or r == 0:
         return own
@@ -110,7 +111,7 @@ def find_residual(model: Any, data: Any, memory: Any, a: Any) -> float:
     dofs, residual, square = dofs_of(memory), reals(memory.residual_at, memory.size), 0.0
     starts, lengths = integers(model.M_rowadr, model.nv), integers(model.M_rownnz, model.nv)
     columns, inertia = integers(model.M_colind, model.nC), reals(data.M, model.nC)
-    smooth, rows = reals(data.qfrc_smooth, model.nv), rows_of(memory)
+    smooth = reals(data.qfrc_smooth, model.nv)
     for k in range(memory.size):  # M is a lower triangle, row by row; rows end on the diagonal
         i = dofs[k].dof
         residual[k] = -smooth[i]
@@ -120,7 +121,7 @@ def find_residual(model: Any, data: Any, memory: Any, a: Any) -> float:
             residual[other] += inertia[n] * a[k]
         residual[k] += inertia[starts[i] + lengths[i] - 1] * a[k]
     for u in units_of(memory):
-        subtract_forces(memory, rows, u, a, residual)
+        subtract_forces(memory, rows_of_unit(memory, u), a, residual)
     for k in range(memory.size):
         i = dofs[k].dof
         square += residual[k] ** 2 / inertia[starts[i] + lengths[i] - 1]
@@ -128,43 +129,43 @@ def find_residual(model: Any, data: Any, memory: Any, a: Any) -> float:
 
 
 @kernel
-def subtract_forces(memory: Any, rows: Any, u: int, a: Any, residual: Any) -> None:
-    """Find the forces of a unit at accelerations `a`, and take J' f off the residual."""
-    unit = rows[u]
-    find_unit_residuals(memory, rows, u, 0, 1, a)
-    if unit.contact < 0:
-        unit.force = row_force(unit)
+def subtract_forces(memory: Any, unit: Any, a: Any, residual: Any) -> None:
+    """Find the forces of a unit's rows at accelerations `a`, and take J' f off the residual."""
+    first = unit[0]
+    find_unit_residuals(memory, unit, 0, 1, a)
+    if first.contact < 0:
+        first.force = row_force(first)
     else:
-        if unit.residual < 0:  # else it is open, and what else there is of it tells nothing
-            find_unit_residuals(memory, rows, u, 1, unit.dim, a)
-        contact = contacts_of(memory)[unit.contact]
-        contact.state = contact_forces(rows, contact)
-    if unit.force == 0:
+        if first.residual < 0:  # else it is open, and what else there is of it tells nothing
+            find_unit_residuals(memory, unit, 1, len(unit), a)
+        contact = contacts_of(memory)[first.contact]
+        contact.state = contact_forces(unit, contact)
+    if first.force == 0:
         return
-    if unit.dim == 3:  # loops of a length that is known are faster
-        subtract_unit(memory, rows, u, 3, residual)
+    if len(unit) == 3:  # loops of a length that is known are faster
+        subtract_unit(memory, unit, 3, residual)
     else:
-        subtract_unit(memory, rows, u, unit.dim, residual)
+        subtract_unit(memory, unit, len(unit), residual)
 
 
 @kernel
-def find_unit_residuals(memory: Any, rows: Any, u: int, first: int, after: int, a: Any) -> None:
+def find_unit_residuals(memory: Any, unit: Any, begin: int, end: int, a: Any) -> None:
     """Set the residuals of some rows of a unit, at accelerations `a`."""
-    place, jacobian = places_of(memory, rows[u]), jacobians_of(memory, rows[u])
-    for r in range(first, after):
-        row, acceleration = rows[u + r], 0.0
+    place, jacobian = places_of(memory, unit[0]), jacobians_of(memory, unit[0])
+    for r in range(begin, end):
+        row, acceleration = unit[r], 0.0
         for n in range(len(place)):
             acceleration += jacobian[r, n] * a[np.uint64(place[n])]
         row.residual = acceleration - row.reference - row.R * row.held
 
 
 @kernel
-def subtract_unit(memory: Any, rows: Any, u: int, dim: int, residual: Any) -> None:
+def subtract_unit(memory: Any, unit: Any, dim: int, residual: Any) -> None:
     """Take J' f of a unit off the residual."""
-    place, jacobian = places_of(memory, rows[u]), jacobians_of(memory, rows[u])
+    place, jacobian = places_of(memory, unit[0]), jacobians_of(memory, unit[0])
     force = reals(memory.local_at, dim)
     for r in range(dim):
-        force[r] = rows[u + r].force
+        force[r] = unit[r].force
     for n in range(len(place)):
         whole = 0.0
         for r in range(dim):
@@ -175,7 +176,7 @@ def subtract_unit(memory: Any, rows: Any, u: int, dim: int, residual: Any) -> No
 @kernel
 def assemble(model: Any, data: Any, memory: Any, matrix: Any) -> None:
     """The derivative of the residual of the island."""
-    rows, contacts, dofs = rows_of(memory), contacts_of(memory), dofs_of(memory)
+    contacts, dofs = contacts_of(memory), dofs_of(memory)
     starts, lengths = integers(model.M_rowadr, model.nv), integers(model.M_rownnz, model.nv)
     columns, inertia = integers(model.M_colind, model.nC), reals(data.M, model.nC)
     for k in range(memory.size):
@@ -187,37 +188,37 @@ def assemble(model: Any, data: Any, memory: Any, matrix: Any) -> None:
             other = columns[n] - i + k
             matrix[k, other] = matrix[other, k] = inertia[n]
     for u in units_of(memory):
-        if rows[u].force != 0:
-            find_stiffness(rows, contacts, u)
-            if rows[u].dim == 3:
-                add_unit(memory, rows, u, 3, matrix)
+        unit = rows_of_unit(memory, u)
+        if unit[0].force != 0:
+            find_stiffness(unit, contacts)
+            if len(unit) == 3:
+                add_unit(memory, unit, 3, matrix)
             else:
-                add_unit(memory, rows, u, rows[u].dim, matrix)
+                add_unit(memory, unit, len(unit), matrix)
 
 
 @kernel
-def find_stiffness(rows: Any, contacts: Any, u: int) -> None:
+def find_stiffness(unit: Any, contacts: Any) -> None:
     """Set how the forces of a unit depend on its residuals."""
-    unit = rows[u]
-    if unit.contact < 0:
-        unit.stiffness[0] = row_stiffness(unit)
+    if unit[0].contact < 0:
+        unit[0].stiffness[0] = row_stiffness(unit[0])
         return
-    for r in range(unit.dim):
-        for s in range(unit.dim):
-            rows[u + r].stiffness[s] = stiffness(rows, contacts[unit.contact], r, s)
+    for r in range(len(unit)):
+        for s in range(len(unit)):
+            unit[r].stiffness[s] = stiffness(unit, contacts[unit[0].contact], r, s)
 
 
 @kernel
-def add_unit(memory: Any, rows: Any, u: int, dim: int, matrix: Any) -> None:
+def add_unit(memory: Any, unit: Any, dim: int, matrix: Any) -> None:
     """Add J' K J of a unit, K being its stiffness, row by row."""
-    place, jacobian = places_of(memory, rows[u]), jacobians_of(memory, rows[u])
+    place, jacobian = places_of(memory, unit[0]), jacobians_of(memory, unit[0])
     factor = reals(memory.local_at, dim)
     for n in range(len(place)):
         own = matrix[place[n]]
         for s in range(dim):
             factor[s] = 0.0
             for r in range(dim):
-                factor[s] += jacobian[r, n] * rows[u + r].stiffness[s]
+                factor[s] += jacobian[r, n] * unit[r].stiffness[s]
         for k in range(len(place)):
             added = 0.0
             for s in range(dim):
@@ -313,12 +314,11 @@ def forces_without_contacts(model: Any, data: Any, memory: Any) -> float:
 @kernel
 def hold_forces(memory: Any) -> float:
     """Let the contacts of the island hold their forces; by how much R made them give way, m s-2."""
-    rows, worst = rows_of(memory), 0.0
+    worst = 0.0
     for u in units_of(memory):
-        for r in range(u, u + rows[u].dim if rows[u].contact >= 0 else u):
-            row = rows[r]
-            worst = max(worst, row.R * abs(row.force - row.held))
-            row.held = row.remembered = row.force
+        unit = rows_of_unit(memory, u)
+        if unit[0].contact >= 0:
+            worst = max(worst, hold(unit))
     return worst
 
 
@@ -330,18 +330,17 @@ def solve_contacts(model: Any, data: Any, memory: Any, a: Any, scale: float) -> 
     Slip that is predicted, and forces that are held, are those that it comes to. Returns whether it
     came to an end.
     """
-    contacts, rows = contacts_of(memory), rows_of(memory)
-    find_residuals(memory, a)
-    for k in range(memory.contacts):
-        contact, normal = contacts[k], rows[contacts[k].address]
+    find_residuals(memory, a, True)
+    for contact in contacts_of(memory):
+        normal = rows_of_contact(memory, contact)[0]
         contact.state = STICKS if normal.residual < 0 or normal.held > 0 else OPEN
     for n in range(memory.law.most):
         if not solve_closed(model, data, memory, a, n == 0, scale):
             return False
-        find_residuals(memory, a)
+        find_residuals(memory, a, True)
         some = False
-        for k in range(memory.contacts):
-            contact, was_open = contacts[k], contacts[k].state == OPEN
+        for contact in contacts_of(memory):
+            rows, was_open = rows_of_contact(memory, contact), contact.state == OPEN
             contact.state = contact_forces(rows, contact)
             contact.closes = was_open and contact.state != OPEN
             contact.predicted = shift(rows, contact) if contact.state != STICKS else 0.0
@@ -350,16 +349,6 @@ def solve_contacts(model: Any, data: Any, memory: Any, a: Any, scale: float) -> 
         if not some:
             return True
     return False
-
-
-@kernel
-def find_residuals(memory: Any, a: Any) -> None:
-    """Set the residuals of all contacts."""
-    contacts, rows = contacts_of(memory), rows_of(memory)
-    for k in range(memory.contacts):
-        for r in range(contacts[k].address, contacts[k].address + contacts[k].dim):
-            row = rows[r]
-            row.residual = times(memory, row, a) - row.reference - row.R * row.held
 
 
 @kernel
@@ -412,7 +401,8 @@ def solve_rigid_island(model: Any, data: Any, memory: Any, scale: float) -> bool
 @kernel
 def multiply_R(memory: Any, factor: float) -> None:
     """Multiply R of the contacts of the island."""
-    rows = rows_of(memory)
     for u in units_of(memory):
-        for r in range(u, u + rows[u].dim if rows[u].contact >= 0 else u):
-            rows[r].R *= factor
+        unit = rows_of_unit(memory, u)
+        if unit[0].contact >= 0:
+            for row in unit:
+                row.R *= factor

@@ -14,9 +14,10 @@ from .compiling import kernel
 from .contacts import cosine, smaller_radius
 from .engine import integers, mj_factorM, mj_fwdActuation, mjd_smooth_vel, reals
 from .friction import shift
-from .memory import CONTACT_ROW, DRY, OPEN, SLIDES, contacts_of, rows_of
+from .memory import CONTACT_ROW, DRY, OPEN, SLIDES, contacts_of, rows_of, rows_of_contact
 from .parameters import ALIGNED, APART, BOUNCES, NARROW, STUCK, USUAL_STEP
 from .rows import times
+from .vectors import dot, plus
 
 # -- contacts --------------------------------------------------------------------------------------
 
@@ -25,11 +26,10 @@ from .rows import times
 def stiffen(model: Any, data: Any, memory: Any) -> None:
     """Make contacts and dry friction stiff, and let them ask for velocities at the end of the
     step."""
-    contacts, h = contacts_of(memory), model.opt.timestep
+    rows, h = rows_of(memory), model.opt.timestep
     estimate, velocity = reals(data.efc_diagA, data.nefc), reals(data.efc_vel, data.nefc)
-    rows = rows_of(memory)
-    for i in range(memory.contacts):
-        contact, first = contacts[i], contacts[i].address
+    for contact in contacts_of(memory):
+        first = contact.address
         goal = velocity_to_ask_for(model, memory, contact, velocity[first], estimate[first])
         if memory.bounces:
             goal = bounced(model, data, memory, contact, goal)
@@ -198,11 +198,8 @@ def leave_gap(model: Any, memory: Any, contact: Any) -> None:
 @kernel
 def in_plane(one: Any, other: Any) -> Any:
     """Where a contact is in the tangents of another one, m."""
-    x, y = 0.0, 0.0
-    for j in range(3):
-        way = other.pos[j] - one.pos[j]
-        x, y = x + one.frame[1, j] * way, y + one.frame[2, j] * way
-    return x, y
+    way = plus(other.pos, -1.0, one.pos)
+    return dot(one.frame[1], way), dot(one.frame[2], way)
 
 
 @kernel
@@ -222,10 +219,8 @@ def write_regularisation(data: Any, memory: Any) -> None:
 def take_depth_away(model: Any, data: Any, memory: Any) -> None:
     """Baumgarte stabilisation: move the distance that a soft contact holds, until under its load it
     has no depth."""
-    contacts, spring = contacts_of(memory), reals(data.efc_KBIP, (data.nefc, 4))
-    rows = rows_of(memory)
-    for i in range(memory.contacts):
-        contact = contacts[i]
+    rows, spring = rows_of(memory), reals(data.efc_KBIP, (data.nefc, 4))
+    for contact in contacts_of(memory):
         lift = contact.lift - model.opt.timestep / memory.law.servo * contact.gap
         contact.lift = min(max(lift, 0.0), contact.margin)
         stiffness = spring[contact.address, 0] * spring[contact.address, 2]
@@ -242,24 +237,24 @@ def oppose_slip_at_mid_step(model: Any, data: Any, memory: Any) -> bool:
     either side. Where slip may end within the step, it must oppose that at the end, and in an
     impact, where a load changes by more than a weight, that after it (Moreau).
     """
-    contacts, rows, h, some = contacts_of(memory), rows_of(memory), model.opt.timestep, False
-    velocity, estimate = reals(data.efc_vel, data.nefc), reals(data.efc_diagA, data.nefc)
-    for i in range(memory.contacts):
-        contact = contacts[i]
-        gained = rows[contact.address].remembered - contact.load
+    h, some, estimate = model.opt.timestep, False, reals(data.efc_diagA, data.nefc)
+    velocities = reals(data.efc_vel, data.nefc)
+    for contact in contacts_of(memory):
+        rows = rows_of_contact(memory, contact)
+        gained = rows[0].remembered - contact.load
         impact = abs(gained) * estimate[contact.address] > memory.gravity
         if contact.state != SLIDES or contact.predicted == 0 or impact:
             continue
-        speed, change = 0.0, 0.0
+        speed, change, velocity = 0.0, 0.0, velocities[contact.address :]
         for t in range(contact.dim - 1):
-            row = rows[contact.address + 1 + t]
-            speed += (contact.mu[t] * velocity[contact.address + 1 + t]) ** 2
+            row = rows[1 + t]
+            speed += (contact.mu[t] * velocity[1 + t]) ** 2
             change += (contact.mu[t] * (row.residual + row.reference)) ** 2
         if speed <= (memory.law.fast * h) ** 2 * change:
             continue
         for t in range(contact.dim - 1):
-            row = rows[contact.address + 1 + t]
-            more = velocity[contact.address + 1 + t] / h
+            row = rows[1 + t]
+            more = velocity[1 + t] / h
             more -= contact.turned[1 + t] if t < 2 else 0.0
             row.reference -= more
             row.residual += more

@@ -7,7 +7,8 @@ from typing import Any
 
 from .compiling import kernel
 from .engine import reals
-from .memory import STICKS, columns_of, contacts_of, jacobian_of, rows_of
+from .memory import STICKS, columns_of, contacts_of, jacobian_of, rows_of, rows_of_contact
+from .vectors import dot, plus
 
 
 @kernel
@@ -20,11 +21,23 @@ def times(memory: Any, row: Any, vector: Any) -> float:
 
 
 @kernel
-def multiply(memory: Any, accelerations: Any) -> None:
-    """Set the residuals of all rows to their Jacobian times the accelerations."""
-    rows = rows_of(memory)
-    for r in range(len(rows)):
-        rows[r].residual = times(memory, rows[r], accelerations)
+def find_residuals(memory: Any, accelerations: Any, holding: bool) -> None:
+    """Set the residuals of all rows: the Jacobian times the accelerations, less the reference; and
+    less R times what they hold, if they are `holding`. There are no forces yet."""
+    for row in rows_of(memory):
+        held = row.held if holding else 0.0
+        row.residual = times(memory, row, accelerations) - (row.reference + row.R * held)
+        row.force = 0.0
+
+
+@kernel
+def hold(rows: Any) -> float:
+    """Let rows hold their forces; by how much R made them give way, m s-2."""
+    most = 0.0
+    for row in rows:
+        most = max(most, row.R * abs(row.force - row.held))
+        row.held = row.remembered = row.force
+    return most
 
 
 @kernel
@@ -40,7 +53,7 @@ def find_surfaces(model: Any, data: Any, memory: Any) -> None:
 def read_rows(data: Any, memory: Any) -> None:
     """Read MuJoCo's regularisation and reference acceleration of all rows. They hold what they
     remember, but for the loads of soft contacts."""
-    contacts, rows = contacts_of(memory), rows_of(memory)
+    rows = rows_of(memory)
     R, reference = reals(data.efc_R, data.nefc), reals(data.efc_aref, data.nefc)
     for r in range(len(rows)):
         row = rows[r]
@@ -48,8 +61,8 @@ def read_rows(data: Any, memory: Any) -> None:
         row.reference = row.given_reference = reference[r]
         row.held = row.remembered
     if not memory.law.rigid:
-        for i in range(memory.contacts):
-            rows[contacts[i].address].held = 0.0
+        for contact in contacts_of(memory):
+            rows[contact.address].held = 0.0
 
 
 @kernel
@@ -69,13 +82,11 @@ def put_rows_back(data: Any, memory: Any) -> None:
 @kernel
 def write_references(data: Any, memory: Any) -> None:
     """Tell MuJoCo reference accelerations that hold what is remembered, less De Saxcé's shift."""
-    contacts = contacts_of(memory)
-    rows = rows_of(memory)
-    reference = reals(data.efc_aref, data.nefc)
+    rows, reference = rows_of(memory), reals(data.efc_aref, data.nefc)
     for r in range(len(rows)):
         reference[r] = rows[r].reference + rows[r].R * rows[r].held
-    for i in range(memory.contacts):
-        reference[contacts[i].address] -= contacts[i].predicted
+    for contact in contacts_of(memory):
+        reference[contact.address] -= contact.predicted
     for r in range(len(rows)):
         rows[r].told = reference[r]
     memory.told = 1
@@ -84,32 +95,29 @@ def write_references(data: Any, memory: Any) -> None:
 @kernel
 def store_velocities(model: Any, data: Any, memory: Any) -> None:
     """Store how contacts part and slip, by the last Jacobians and the velocities now."""
-    contacts, rows, velocity = contacts_of(memory), rows_of(memory), reals(data.qvel, model.nv)
-    for i in range(memory.contacts):
-        contact = contacts[i]
+    velocity = reals(data.qvel, model.nv)
+    for contact in contacts_of(memory):
+        rows, total = rows_of_contact(memory, contact), (0.0, 0.0, 0.0)
         contact.belt = 0.0
-        for j in range(3):
-            contact.velocity[j] = 0.0
         for axis in range(min(contact.dim, 3)):
-            row = rows[contact.address + axis]
-            speed = times(memory, row, velocity) + row.surface
-            contact.belt += abs(row.surface)
-            for j in range(3):
-                contact.velocity[j] += speed * contact.frame[axis, j]
+            speed = times(memory, rows[axis], velocity) + rows[axis].surface
+            contact.belt += abs(rows[axis].surface)
+            total = plus(total, speed, contact.frame[axis])
+        for j in range(3):
+            contact.velocity[j] = total[j]
 
 
 @kernel
 def add_turning(model: Any, data: Any, memory: Any, since: float, moved: bool) -> None:
     """Let contacts that stick turn along with their bodies, or roll: rows leave out that Jacobians
     change. A call at the time of the last one, `since` 0 s, adds the same."""
-    contacts, rows = contacts_of(memory), rows_of(memory)
-    for i in range(memory.contacts):
-        contact = contacts[i]
+    for contact in contacts_of(memory):
         if since != 0:
             known = moved and contact.dim > 1 and contact.velocity[0] < math.inf
             find_turning(model, data, memory, contact, since, known)
+        rows = rows_of_contact(memory, contact)
         for axis in range(min(contact.dim, 3)):
-            rows[contact.address + axis].reference -= contact.turned[axis]
+            rows[axis].reference -= contact.turned[axis]
 
 
 @kernel
@@ -133,7 +141,5 @@ def find_turning(
     for axis in range(3):
         contact.turned[axis] = 0.0
         if known and (axis > 0 or (rigid and sticks and contact.load > 0)):
-            change = velocity[first + axis]
-            for j in range(3):
-                change -= contact.frame[axis, j] * contact.velocity[j]
+            change = velocity[first + axis] - dot(contact.frame[axis], contact.velocity)
             contact.turned[axis] = change * (1 - lost / 2) / since

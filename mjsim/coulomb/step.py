@@ -23,10 +23,9 @@ from .friction import (
     predict_slip,
     store_forces,
     strengthen,
-    subtract_references,
     weaken,
 )
-from .memory import CONTACT_ROW, DRY, contacts_of, memories, rows_of
+from .memory import contacts_of, memories, rows_of, rows_of_contact
 from .newton import solve_contacts
 from .parameters import EARTH, NEXT, OVER, R_LEAST, SOFTER
 from .patches import add_points_below, leave_added_points_out, put_points_back
@@ -41,14 +40,16 @@ from .rigid import (
 )
 from .rows import (
     add_turning,
+    find_residuals,
     find_surfaces,
-    multiply,
+    hold,
     put_rows_back,
     read_rows,
     store_velocities,
     write_references,
 )
 from .turning import add_gyroscopic_moments, turn_accelerations
+from .vectors import dot
 
 
 @kernel
@@ -96,11 +97,12 @@ def update_contacts(
     model: Any, data: Any, memory: Any, known: bool, over: bool, moved: bool
 ) -> None:
     """Find the contacts and rows of the step; they remember what those before bore."""
+    if over:
+        keep_forces(memory)
     if not moved:
         read_gaps(data, memory)
-        keep_forces(memory, over)
         return
-    hand_on(model, data, memory, known, over)
+    hand_on(model, data, memory, known)
     find(model, data, memory)
     anew = False
     if match(model, data, memory) > memory.least:
@@ -122,7 +124,6 @@ def update_contacts(
 def find_references(model: Any, data: Any, memory: Any, since: float, moved: bool) -> None:
     """Find what rows ask for: MuJoCo's references, mended."""
     read_rows(data, memory)
-    multiply(memory, reals(data.qacc, model.nv))
     if memory.law.rigid:
         stiffen(model, data, memory)
     elif memory.law.servo:
@@ -182,20 +183,17 @@ def conclude(model: Any, data: Any, memory: Any) -> None:
 
 
 @kernel
-def keep_forces(memory: Any, over: bool) -> None:
-    """What the rows of this step remember, if nothing has moved: of a step that is over its
-    forces."""
-    rows = rows_of(memory)
-    for r in range(len(rows) if over else 0):
-        if rows[r].kind == DRY or rows[r].kind == CONTACT_ROW:
-            rows[r].remembered = rows[r].force
+def keep_forces(memory: Any) -> None:
+    """Let rows remember the forces of a step that is over."""
+    for row in rows_of(memory):
+        row.remembered = row.force
 
 
 @kernel
-def hand_on(model: Any, data: Any, memory: Any, known: bool, over: bool) -> None:
+def hand_on(model: Any, data: Any, memory: Any, known: bool) -> None:
     """Make the contacts of the last step, with what they bore, those before."""
     if known and not memory.stored:
-        store(model, data, memory, over)
+        store(model, data, memory)
     memory.stored = 0
     memory.contacts_before, memory.dry_before = 0, 0
     if known:
@@ -204,18 +202,17 @@ def hand_on(model: Any, data: Any, memory: Any, known: bool, over: bool) -> None
 
 
 @kernel
-def store(model: Any, data: Any, memory: Any, over: bool) -> None:
+def store(model: Any, data: Any, memory: Any) -> None:
     """Store forces in the axes of bodies, and how contacts part and slip."""
-    store_forces(memory, over)
+    store_forces(memory)
     store_velocities(model, data, memory)
 
 
 @kernel
 def size_of_gravity(model: Any) -> float:
     """The size of gravity, m s-2; the earth's if there is none."""
-    g = model.opt.gravity
-    size = math.sqrt(g[0] ** 2 + g[1] ** 2 + g[2] ** 2)
-    return size if size > 0 else EARTH
+    gravity = model.opt.gravity
+    return math.sqrt(dot(gravity, gravity)) or EARTH
 
 
 @kernel
@@ -245,8 +242,7 @@ def solve_rigid(model: Any, data: Any, memory: Any, start: Any) -> bool:
     it is known what slips."""
     soften(memory)
     solved = solve_contacts(model, data, memory, start, 1.0)
-    multiply(memory, start)
-    subtract_references(memory)
+    find_residuals(memory, start, False)
     if oppose_slip_at_mid_step(model, data, memory):
         solved &= solve_contacts(model, data, memory, start, R_LEAST)
     extrapolate_slip(model, data, memory)
@@ -257,7 +253,6 @@ def solve_rigid(model: Any, data: Any, memory: Any, start: Any) -> bool:
 def iterate(model: Any, data: Any, memory: Any, start: Any) -> bool:
     """Let MuJoCo solve for the slip that was found last, until it is found again; rigid contacts
     hold the forces that were."""
-    contacts, rows = contacts_of(memory), rows_of(memory)
     acceleration = reals(data.qacc, model.nv)
     if memory.law.rigid:
         write_regularisation(data, memory)
@@ -267,11 +262,10 @@ def iterate(model: Any, data: Any, memory: Any, start: Any) -> bool:
         for i in range(model.nv):
             start[i] = acceleration[i]
         worst = find_forces(model, data, memory)
-        for i in range(memory.contacts):
-            contact = contacts[i]
-            contact.predicted, contact.extrapolated = contact.found, -1.0
-            for r in range(contact.address, contact.address + contact.dim * memory.law.rigid):
-                rows[r].held = rows[r].remembered = rows[r].force
+        for contact in contacts_of(memory):
+            contact.extrapolated = -1.0
+            if memory.law.rigid:
+                hold(rows_of_contact(memory, contact))
         if worst <= memory.enough:
             return True
     return False
@@ -280,7 +274,6 @@ def iterate(model: Any, data: Any, memory: Any, start: Any) -> bool:
 @kernel
 def soften(memory: Any) -> None:
     """Make contacts softer, for a solution in which they come to hold what they bear."""
-    contacts, rows = contacts_of(memory), rows_of(memory)
-    for i in range(memory.contacts):
-        for r in range(contacts[i].address, contacts[i].address + contacts[i].dim):
-            rows[r].R *= SOFTER
+    for contact in contacts_of(memory):
+        for row in rows_of_contact(memory, contact):
+            row.R *= SOFTER
