@@ -23,18 +23,14 @@ from .step import conclude, keep_forces, law_of_a_step, store
 
 _SLOT = ctypes.c_void_p.in_dll(LIBRARY, "mjcb_control")
 
-_Switched = tuple[bool, Callable[[], None]]
-"""Whether what brakes is made inertia; what puts a model's options back."""
-
 TABLE = np.dtype(
     [
         ("previous", np.int64),  # the callback that was there before, by its address
         ("ask", np.int64),  # the function of Python that is told of simulations unknown here
         ("models", np.int64),  # how many models are installed
         ("model_at", np.int64),
-        ("simulations", np.int64),  # how many simulations are known, by the address of their mjData
-        ("data_at", np.int64),
-        ("memory_at", np.int64),
+        ("simulations", np.int64),  # how many are known: addresses of their mjData and memories
+        ("known_at", np.int64),
     ],
     align=True,
 )
@@ -50,22 +46,14 @@ _table, _tables = address_of(f"{__package__}.table", table), array_at(TABLE)
 @kernel
 def memory_of(m: int, d: int) -> int:
     """Address of the memory of a simulation; 0 if it is not under the law."""
-    known = _tables(words(_table(), 1)[0], 1)[0]
-    datas, low, high = words(known.data_at, known.simulations), 0, known.simulations
-    while low < high:
-        middle = (low + high) // 2
-        if datas[middle] < d:
-            low = middle + 1
-        else:
-            high = middle
-    if low < known.simulations and datas[low] == d:
-        found = words(known.memory_at, known.simulations)[low]
-        if memories(found, 1)[0].model == m:
-            return int(found)
-    installed = words(known.model_at, known.models)
-    for i in range(known.models):
-        if installed[i] == m:
-            return int(call(known.ask, m, d))
+    table = _tables(words(_table(), 1)[0], 1)[0]
+    known = words(table.known_at, (table.simulations, 2))
+    for i in range(table.simulations):
+        if known[i, 0] == d and memories(known[i, 1], 1)[0].model == m:
+            return int(known[i, 1])
+    for model in words(table.model_at, table.models):
+        if model == m:
+            return int(call(table.ask, m, d))
     return 0
 
 
@@ -99,10 +87,10 @@ class Callback:
     """Who is under the law: one for the process."""
 
     def __init__(self) -> None:
-        self._lock, self._users = threading.RLock(), 0
+        self._lock = threading.RLock()
         self._before: int | None = None  # the callback that was there, by its address
-        # by model: its users, whether they are rigid, and what `set` was given
-        self._options: dict[int, tuple[int, bool, bool, Callable[[], None]]] = {}
+        # by model: how many users it has, whether they are rigid, and its own options
+        self._users: dict[int, tuple[int, bool, dict[str, Any]]] = {}
         self._simulations: dict[int, Simulation] = {}
         self._installed: dict[int, Callable[[int], Simulation]] = {}
         self._ask = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)(self._adopt)
@@ -118,18 +106,14 @@ class Callback:
         """
         self._tables += 1
         number, simulations = self._tables, dict(self._simulations)
-        known = sorted(simulations)
-        arrays = [
-            np.array(each, np.int64)
-            for each in ([*self._installed], known, [simulations[k].address for k in known])
-        ]
+        models = np.array([*self._installed], np.int64)
+        known = np.array([(data, of.address) for data, of in simulations.items()], np.int64)
         new: Any = np.zeros(1, TABLE)
-        new["ask"] = ctypes.cast(self._ask, ctypes.c_void_p).value
-        new["models"], new["simulations"] = len(arrays[0]), len(known)
-        for name, array in zip(("model_at", "data_at", "memory_at"), arrays, strict=True):
-            new[name] = array.ctypes.data
         new["previous"] = self._before or 0
-        kept, address = [*self._in_force[-7:], (new, arrays)], new.ctypes.data
+        new["ask"] = ctypes.cast(self._ask, ctypes.c_void_p).value
+        new["models"], new["model_at"] = len(models), models.ctypes.data
+        new["simulations"], new["known_at"] = len(known), known.ctypes.data
+        kept, address = [*self._in_force[-7:], (new, models, known)], new.ctypes.data
         if number == self._tables:
             self._in_force, table[0] = kept, address
 
@@ -185,10 +169,8 @@ class Callback:
             self._publish()
             return bool(_SLOT.value == _served())
 
-    def set(self, model: Any, rigid: bool, switch: Callable[[], _Switched]) -> bool:
-        """Set MuJoCo's callback, unless it is set; the first user of a model switches its options.
-
-        Returns whether what brakes is made inertia.
+    def set(self, model: Any, rigid: bool, wanted: Callable[[], Mapping[str, Any]]) -> None:
+        """Set MuJoCo's callback, unless it is set; the first user of a model sets its options.
 
         Raises
         ------
@@ -196,34 +178,31 @@ class Callback:
             If a law of the other kind, soft or rigid, acts on the model just now.
         """
         with self._lock:
-            known = self._options.get(model._address) or (0, rigid, *switch())
-            users, as_rigid, braking, back = known
+            users, as_rigid, options = self._users.get(model._address) or (0, rigid, {})
             if as_rigid != rigid:
                 kinds = "rigid and soft Coulombs need different options"
                 raise ValueError(f"{kinds}: one at a time for a model")
-            self._options[model._address] = users + 1, rigid, braking, back
-            self._users += 1
+            if not users:
+                for name, value in wanted().items():
+                    options[name] = getattr(model.opt, name)
+                    setattr(model.opt, name, value)
+            self._users[model._address] = users + 1, rigid, options
             before = _SLOT.value
             if before != _served():
                 if before != self._before:
                     self._before = before
                     self._publish()
                 _SLOT.value = _served()
-            return braking
-
-    def braking(self, model: int) -> bool:
-        """Whether what brakes in a model is made inertia."""
-        return model in self._options and self._options[model][2]
 
     def unset(self, model: Any) -> None:
         """Put back options after their last user, and the callback, unless another one was set."""
         with self._lock:
-            users, rigid, braking, back = self._options.pop(model._address)
+            users, rigid, options = self._users.pop(model._address)
             if users > 1:
-                self._options[model._address] = users - 1, rigid, braking, back
+                self._users[model._address] = users - 1, rigid, options
             else:
-                back()
-            self._users -= 1
+                for name, value in options.items():
+                    setattr(model.opt, name, value)
             if not self._users and _SLOT.value == _served():
                 _SLOT.value = self._before
 

@@ -7,7 +7,7 @@ import math
 import sys
 import warnings
 import weakref
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import mujoco
@@ -113,25 +113,23 @@ class Coulomb:
             share=float(share),
             depth=float(depth),
         )
-        self._begin(model, law, float(model.opt.timestep))
+        self.__setstate__((model, law, float(model.opt.timestep), None))
         self._check()
         _check_friction(model)
         if rigid:
             _see_ahead(model)
 
-    def _begin(self, model: Any, law: Law, step: float) -> None:
-        """Set what belongs to the model; nothing is remembered."""
-        self.model, self._law, self._step = model, law, step
-        self._simulations: dict[int, Simulation] = {}
-        self._restored: Mapping[str, npt.NDArray[Any]] | None = None
-        weakref.finalize(self, _remove_all, self._simulations)
-
-    def __reduce__(self) -> Any:
+    def __getstate__(self) -> tuple[Any, Law, float, Mapping[str, npt.NDArray[Any]] | None]:
         try:
             state = self.state() if len(self._simulations) == 1 else self._restored
         except ValueError as error:
             raise TypeError(f"a Coulomb can't be copied now: {error}, or reset()") from error
-        return _copy, (self.model, self._law, self._step, state)
+        return self.model, self._law, self._step, state
+
+    def __setstate__(self, given: Any) -> None:
+        self.model, self._law, self._step, self._restored = given
+        self._simulations: dict[int, Simulation] = {}
+        weakref.finalize(self, _remove_all, self._simulations)
 
     def _check(self) -> None:
         """Raise `ValueError` if the model has an option or a part the law can't be applied with."""
@@ -183,18 +181,17 @@ class Coulomb:
 
     def _adopt(self, address: int) -> Simulation:
         """A memory for the data at an address, which go on from a restored state, if any."""
-        simulation = self._simulations[address] = Simulation(self.model, self._law)
-        if self._restored is not None:
-            simulation.restore(self._restored)
-            self._restored = None
-        simulation.braking[0] = CALLBACK.braking(self.model._address)
+        simulation = self._simulations[address] = self._begun()
+        self._restored = None
         simulation.active[0] = CALLBACK.installed(self.model._address)
         return simulation
 
-    def addresses(self, data: Any) -> tuple[int, int, int]:
-        """Addresses of model, data and memory, for compiled loops that call `mj_step` in
-        `acting`."""
-        return self.model._address, data._address, self._simulation(data).address
+    def _begun(self) -> Simulation:
+        """A memory that goes on from a restored state, if there is any."""
+        simulation = Simulation(self.model, self._law)
+        if self._restored is not None:
+            simulation.restore(self._restored)
+        return simulation
 
     def reset(self) -> None:
         """Forget all, as after `mj_resetData`; a jump of `data.time` does so, too."""
@@ -221,9 +218,7 @@ class Coulomb:
         elif self._simulations:
             (simulation,) = self._simulations.values()
         else:
-            simulation = Simulation(self.model, self._law)
-            if self._restored is not None:
-                simulation.restore(self._restored)
+            simulation = self._begun()
         if simulation.knows and simulation.unsettled:
             of = simulation.data()
             if of is None:
@@ -264,14 +259,8 @@ class Coulomb:
             raise ValueError(
                 f"nstep = {_shown(nstep)} must be a whole number from 0 to {_MOST_STEPS}"
             )
-        simulation, active = self._enter(data)  # `acting` in fewer microseconds
-        try:
+        with self.acting(data):
             mujoco.mj_step(self.model, data, nstep)
-        except BaseException:
-            simulation.reset()
-            raise
-        finally:
-            self._leave(data, simulation, active)
 
     def forward(self, data: Any) -> None:
         """Compute forces, accelerations and sensors under the law, as `mujoco.mj_forward` does."""
@@ -286,7 +275,7 @@ class Coulomb:
     def step1(self, data: Any) -> None:
         """First half of a step, as `mujoco.mj_step1`: then set controls, and call `step2`."""
         self._check_halves(data)
-        CALLBACK.set(self.model, self._law.rigid, self._switch)
+        CALLBACK.set(self.model, self._law.rigid, self._options)
         try:
             mujoco.mj_step1(self.model, data)
         finally:
@@ -315,59 +304,38 @@ class Coulomb:
     @contextlib.contextmanager
     def acting(self, data: Any) -> Iterator[None]:
         """Within this MuJoCo's own functions, called with these data, obey the law."""
-        simulation, active = self._enter(data)
+        simulation = self._simulation(data)
+        self._check()
+        active = simulation.active[0]
+        CALLBACK.set(self.model, self._law.rigid, self._options)
+        simulation.active[0] = 1
         try:
             yield
         except BaseException:
             simulation.reset()  # the step was left in its middle
             raise
         finally:
-            self._leave(data, simulation, active)
+            finish(self.model._address, data._address, simulation.address, False)
+            simulation.active[0] = active
+            CALLBACK.unset(self.model)
 
-    def _enter(self, data: Any) -> tuple[Simulation, int]:
-        """Let the law act; return whose memory it has, and whether it acted before."""
-        simulation = self._simulation(data)
-        self._check()
-        active = simulation.active[0]
-        simulation.braking[0] = CALLBACK.set(self.model, self._law.rigid, self._switch)
-        simulation.active[0] = 1
-        return simulation, active
-
-    def _leave(self, data: Any, simulation: Simulation, active: int) -> None:
-        finish(self.model._address, data._address, simulation.address, False)
-        simulation.active[0] = active
-        CALLBACK.unset(self.model)
-
-    def _switch(self) -> tuple[bool, Callable[[], None]]:
-        """Switch the model to options under which the law acts.
+    def _options(self) -> dict[str, Any]:
+        """Options of the model under which the law acts.
 
         Rigid contacts ask for velocities after a step, so they must know of what brakes:
         `add_dampers` makes it inertia, and Euler's method leaves it alone. MuJoCo's integrators
         take it into account, too, but only after contacts have been solved for.
-
-        Returns
-        -------
-        whether what brakes is made inertia; what puts options back
         """
-        option = self.model.opt
-        cone, integrator, flags = option.cone, option.integrator, option.disableflags
-        accuracy, tolerance, solver = option.ccd_tolerance, option.tolerance, option.solver
-        braking = False
-        option.cone = _ELLIPTIC
-        # from no force PGS only tries a normal one, which De Saxcé's shift keeps at none
-        option.solver = _NEWTON if solver == _PGS else solver
+        option, wanted = self.model.opt, {"cone": _ELLIPTIC}
+        if option.solver == _PGS:
+            # from no force PGS only tries a normal one, which De Saxcé's shift keeps at none
+            wanted["solver"] = _NEWTON
         if self._law.rigid:
-            braking = integrator != _EULER or not flags & _NO_DAMPING
-            option.integrator, option.disableflags = _EULER, flags | _NO_DAMPING
+            wanted["integrator"], wanted["disableflags"] = _EULER, option.disableflags | _NO_DAMPING
             # what lies on a smooth side rolls off if its point is a micrometre beside it
-            option.ccd_tolerance = min(accuracy, CCD_TOLERANCE)
-            option.tolerance *= max(DOFS / max(self.model.nv, 1), 1.0)
-
-        def back() -> None:
-            option.cone, option.integrator, option.disableflags = cone, integrator, flags
-            option.ccd_tolerance, option.tolerance, option.solver = accuracy, tolerance, solver
-
-        return braking, back
+            wanted["ccd_tolerance"] = min(option.ccd_tolerance, CCD_TOLERANCE)
+            wanted["tolerance"] = option.tolerance * max(DOFS / max(self.model.nv, 1), 1.0)
+        return wanted
 
     @contextlib.contextmanager
     def installed(self) -> Iterator[Coulomb]:
@@ -386,10 +354,10 @@ class Coulomb:
         self._check()
         if CALLBACK.installed(address):
             raise ValueError("this model is under installed() already")
-        braking = CALLBACK.set(self.model, self._law.rigid, self._switch)
+        CALLBACK.set(self.model, self._law.rigid, self._options)
         CALLBACK.install(address, self._adopt, self._simulations)
         for simulation in self._simulations.values():
-            simulation.active[0], simulation.braking[0] = 1, braking
+            simulation.active[0] = 1
         acted = True
         try:
             yield self
@@ -404,16 +372,6 @@ class Coulomb:
                 RuntimeWarning,
                 stacklevel=3,
             )
-
-
-def _copy(
-    model: Any, law: Law, step: float, state: Mapping[str, npt.NDArray[Any]] | None
-) -> Coulomb:
-    """A copy of a `Coulomb`, whose model is as it needs it."""
-    coulomb = Coulomb.__new__(Coulomb)
-    coulomb._begin(model, law, step)
-    coulomb._restored = state
-    return coulomb
 
 
 def _remove(simulations: dict[int, Simulation], address: int) -> None:

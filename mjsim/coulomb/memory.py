@@ -167,7 +167,6 @@ MEMORY = np.dtype(
         ("gravity", _f8),  # its size, m s-2
         ("enough", _f8),  # `share` of it: to which a step must know how contacts slip, m s-2
         ("told", _i8),  # whether mjData was told its rows
-        ("braking", _i8),  # whether what brakes is made inertia
         ("braked", _i8),  # the last number of M that it has changed, -1: none; what that is now
         ("braked_is", _f8),
         *((f"room_{name}", _i8) for name in ("contacts", "rows", "jacobian")),
@@ -319,7 +318,7 @@ class Simulation:
         self._own("xpos", np.zeros((model.nbody, 3)))
         self._own("xmat", np.zeros((model.nbody, 9)))
         self.make_room(16, 64, 64 * min(model.nv, 16))
-        self.active, self.braking = record["active"], record["braking"]
+        self.active = record["active"]
         self.data: Callable[[], Any] = lambda: None
         self.reset()
         _SIMULATIONS[self.address] = self

@@ -26,7 +26,7 @@ def find_residuals(memory: Any, accelerations: Any, holding: bool) -> None:
     less R times what they hold, if they are `holding`. There are no forces yet."""
     for row in rows_of(memory):
         held = row.held if holding else 0.0
-        row.residual = times(memory, row, accelerations) - (row.reference + row.R * held)
+        row.residual = times(memory, row, accelerations) - row.reference - row.R * held
         row.force = 0.0
 
 

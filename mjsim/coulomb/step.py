@@ -73,7 +73,7 @@ def law_of_a_step(m: int, d: int, at: int) -> None:
         return
     memory.gravity = size_of_gravity(model)
     memory.enough = memory.law.share * memory.gravity
-    if memory.braking:
+    if rigid:
         add_dampers(model, data, memory)
     moved = not known or not nothing_moved(model, data, memory)
     update_contacts(model, data, memory, known, over, moved)
