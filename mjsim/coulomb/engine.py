@@ -89,16 +89,12 @@ MJ_MODEL = _only(
 MJ_DATA = _only(
     structure("mjData"),
     *("time", "ncon", "nefc", "ne", "nf", "nisland"),
-    *("warning", "contact", "geom_xpos", "geom_xmat"),
+    *("contact", "geom_xpos", "geom_xmat"),
     *("qvel", "qacc", "qacc_warmstart", "qfrc_bias", "xpos", "xmat", "crb", "cvel", "subtree_com"),
     *("efc_J", "efc_J_rownnz", "efc_J_rowadr", "efc_J_colind", "efc_KBIP", "efc_R", "efc_D"),
     *("efc_diagA", "efc_vel", "efc_aref", "efc_frictionloss"),
     *("efc_type", "map_efc2iefc", "iefc_R", "iefc_D", "M", "qDeriv", "qfrc_smooth", "qacc_smooth"),
 )
-WARNINGS = tuple(
-    int(getattr(mujoco.mjtWarning, f"mjWARN_BAD{what}")) for what in ("QPOS", "QVEL", "QACC")
-)
-"""Those after which MuJoCo has reset a simulation."""
 MOST_POINTS = 50
 """Points that a collider finds of a pair at most; they begin with distance, place and normal."""
 POINT = structure("mjPreContact" if "mjPreContact" in structs.STRUCTS else "mjContact").itemsize

@@ -39,23 +39,21 @@ def find_islands(model: Any, memory: Any, everywhere: bool) -> None:
         dofs[i].label = root(dofs, parent[i]) if parent[i] >= 0 else i
         dofs[i].tree = dofs[parent[i]].tree if parent[i] >= 0 else i
         dofs[i].next, dofs[i].unit, dofs[i].due = -1, -1, everywhere
-    for u in range(len(rows)):
-        rows[u].dof = -1
-        column = columns_of(memory, rows[u])
-        if rows[u].dim > 0 and len(column) > 0:
-            rows[u].dof = column[0]
-            connects = rows[u].contact < 0 or contacts[rows[u].contact].state != OPEN
-            for n in range(len(column) if connects else 0):
-                one, other = root(dofs, column[0]), root(dofs, column[n])
-                dofs[max(one, other)].label = min(one, other)
+    for row in rows:
+        column = columns_of(memory, row)
+        connects = row.dim > 0 and (row.contact < 0 or contacts[row.contact].state != OPEN)
+        for n in range(len(column) if connects else 0):
+            one, other = root(dofs, column[0]), root(dofs, column[n])
+            dofs[max(one, other)].label = min(one, other)
     for i in range(model.nv - 1, -1, -1):
         first = root(dofs, i)
         dofs[i].label = first
         if first != i:
             dofs[i].next, dofs[first].next = dofs[first].next, i
     for u in range(len(rows) - 1, -1, -1):
-        if rows[u].dof >= 0 and in_one_island(dofs, columns_of(memory, rows[u])):
-            island = dofs[dofs[rows[u].dof].label]
+        column = columns_of(memory, rows[u])
+        if rows[u].dim > 0 and in_one_island(dofs, column):
+            island = dofs[dofs[column[0]].label]
             rows[u].next, island.unit = island.unit, u
             if rows[u].contact >= 0:
                 island.due |= contacts[rows[u].contact].closes
@@ -63,8 +61,8 @@ def find_islands(model: Any, memory: Any, everywhere: bool) -> None:
 
 @kernel
 def in_one_island(dofs: Any, column: Any) -> bool:
-    """Whether degrees of freedom belong to the same island."""
-    same = True
+    """Whether degrees of freedom, if there are any, belong to the same island."""
+    same = len(column) > 0
     for c in column:
         same = same and dofs[c].label == dofs[column[0]].label
     return same

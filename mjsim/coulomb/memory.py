@@ -92,8 +92,8 @@ ROW = np.dtype(
         ("first", _i4),  # where its Jacobian begins, and how long that is without zeros
         ("length", _i4),
         # if it is the first of a unit of Newton's method: how many rows that has, else 0; its
-        # contact, or -1; a degree of freedom that it moves, -1: none; the next unit of its island
-        *((name, _i4) for name in ("dim", "contact", "dof", "next")),
+        # contact, or -1; the next unit of its island
+        *((name, _i4) for name in ("dim", "contact", "next")),
         ("surface", _f8),  # velocity that surfaces have on their bodies, m s-1
         # what mjData had before, and what it was told
         *((name, _f8) for name in ("given_R", "given_reference", "told")),
@@ -158,11 +158,10 @@ MEMORY = np.dtype(
         ("first_dry", _i8),
         ("free_bodies", _i8),
         ("ncon", _i8),  # contacts of mjData when they were found; -1 after a state was restored
-        ("resets", _i8),  # by MuJoCo, of bad states; -1: not known
         ("pending", _i8),  # whether forces are still to be found
         ("stored", _i8),  # whether contacts have their forces in the axes of bodies
-        # steps that were solved; factorisations that took; steps that didn't reach their tolerance
-        *((name, _i8) for name in ("solves", "factorisations", "unsolved")),
+        ("solves", _i8),  # steps that were solved
+        ("unsolved", _i8),  # those of them that didn't come to `share`
         ("active", _i8),  # whether the law applies
         ("gravity", _f8),  # its size, m s-2
         ("enough", _f8),  # `share` of it: to which a step must know how contacts slip, m s-2
@@ -393,30 +392,21 @@ class Simulation:
         record["contacts"], record["dry"] = len(contacts), len(joints)
         record["time"], record["timestep"] = state["time"]
         record["called"], record["known"] = state["time"][0], 1
-        record["pending"], record["stored"], record["ncon"], record["resets"] = 0, 1, -1, -1
+        record["pending"], record["stored"], record["ncon"] = 0, 1, -1
 
 
 def check_state(state: Mapping[str, npt.NDArray[Any]], model: Any, law: Law) -> None:
     """Raise `ValueError` unless it is a state of a simulation of this model."""
-    free = len(free_bodies(model)) if law.rigid else 0
-    wanted: dict[str, tuple[Any, tuple[int | None, ...]]] = {
-        "contacts": (REMEMBERED_CONTACT, (None,)),
-        "joints": (_f8, (None,)),
-        "spins": (_f8, (free, 6)),
-        "time": (_f8, (2,)),
-        "sizes": (_i8, (len(_SIZES),)),
-    }
-    for name, (kind, shape) in wanted.items():
+    for name, like in Simulation(model, law).state().items():
         try:
             values: Any = np.asarray(state[name])
         except (KeyError, TypeError, IndexError, ValueError) as error:
             raise ValueError(f"not a state of Coulomb: it has no array {name}") from error
-        if values.dtype != kind:
+        if values.dtype != like.dtype:
             given = values.dtype if values.dtype.names is None else "a structure"
             raise ValueError(f"not a state of Coulomb: {name} of type {given}")
-        if len(shape) != values.ndim or any(
-            count not in (None, there) for count, there in zip(shape, values.shape, strict=True)
-        ):
+        of_any_length = name in ("contacts", "joints") and values.ndim == 1
+        if values.shape != like.shape and not of_any_length:
             raise ValueError(f"not a state of Coulomb: {name} of shape {values.shape}")
         fields = values.dtype.names or ()
         for each in [values[field] for field in fields if field != "velocity"] or [values]:

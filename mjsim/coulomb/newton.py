@@ -282,7 +282,6 @@ def solve_island(model: Any, data: Any, memory: Any, exactness: float) -> bool:
             return True
         assemble(model, data, memory, matrix)
         factorise(matrix, dofs)
-        memory.factorisations += 1
         for k in range(size):
             step[k] = -residual[k]
         substitute(matrix, dofs, step)

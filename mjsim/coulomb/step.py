@@ -9,7 +9,6 @@ from .compiling import kernel
 from .contacts import copy_jacobians, find, match, nothing_moved, read_gaps, remember_forces
 from .edges import leave_inner_edges_out
 from .engine import (
-    WARNINGS,
     datas,
     mj_fwdAcceleration,
     mj_fwdActuation,
@@ -140,18 +139,15 @@ def begin(model: Any, data: Any, memory: Any) -> Any:
     """Whether the last step is known; whether it is over; the time since the last call, s.
 
     Stages of Runge and Kutta, and `mj_forward`, are calls within a step, which know what it knew as
-    it began. A jump of time, or a reset by MuJoCo, ends what is known.
+    it began. A jump of time, as MuJoCo makes it where it resets bad states, ends what is known.
     """
-    warnings, resets = data.warning, 0
-    for i in range(len(WARNINGS)):
-        resets += warnings[WARNINGS[i]].number
     elapsed, since = data.time - memory.time, data.time - memory.called
-    known = 0 <= elapsed <= NEXT * memory.timestep and memory.resets in (resets, -1)
+    known = 0 <= elapsed <= NEXT * memory.timestep
     over = elapsed > OVER * memory.timestep
     if known and over:
         conclude(model, data, memory)
     if over or not known:
-        memory.time, memory.timestep, memory.resets = data.time, model.opt.timestep, resets
+        memory.time, memory.timestep = data.time, model.opt.timestep
         memory.known = known
     known = memory.known != 0
     memory.called = data.time
