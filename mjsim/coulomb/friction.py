@@ -49,12 +49,11 @@ def weaken(model: Any, data: Any, memory: Any) -> None:
     weight at least, since others may bear it. Faster than that it begins to slide.
     """
     found = engine_contacts(data.contact, data.ncon)
-    velocity, estimate = reals(data.efc_vel, data.nefc), reals(data.efc_diagA, data.nefc)
     for contact in contacts_of(memory):
         rows, square, gives_way = rows_of_contact(memory, contact), 0.0, SLOWEST * memory.gravity
-        load = max(rows[0].remembered, memory.gravity / estimate[contact.address])
+        load = max(rows[0].remembered, memory.gravity / rows[0].estimate)
         for t in range(2 if contact.dim > 1 else 0):
-            square += velocity[contact.address + 1 + t] ** 2
+            square += rows[1 + t].velocity ** 2
             if not contact.weakened:
                 gives_way = max(gives_way, rows[1 + t].R * contact.mu[t] * load)
         slides = contact.state != STICKS and square > (model.opt.timestep * gives_way) ** 2
@@ -175,17 +174,16 @@ def shift(rows: Any, contact: Any) -> float:
 
 
 @kernel
-def feedback(contact: Any, estimate: Any) -> float:
+def feedback(rows: Any, contact: Any) -> float:
     """How strongly the load of a contact that slides acts on its slip, through friction: mu^2 by
     MuJoCo's estimate, which is alike for all directions, and divides friction's by impratio."""
-    across = contact.mu[0] ** 2 * estimate[contact.address + 1]
-    return float(across / estimate[contact.address])
+    return float(contact.mu[0] ** 2 * rows[1].estimate / rows[0].estimate)
 
 
 @kernel
 def predict_slip(model: Any, data: Any, memory: Any) -> bool:
     """Predict slip, as if accelerations stayed those of the last step; whether that is in doubt."""
-    doubt, rigid, estimate = False, memory.law.rigid, reals(data.efc_diagA, data.nefc)
+    doubt, rigid = False, memory.law.rigid
     find_residuals(memory, reals(data.qacc, model.nv), False)
     for contact in contacts_of(memory):
         rows = rows_of_contact(memory, contact)
@@ -196,11 +194,11 @@ def predict_slip(model: Any, data: Any, memory: Any) -> bool:
             continue
         if contact.state == STICKS or power(rows) >= 0:  # it stops
             contact.predicted = 0.0
-            doubt |= slip > memory.enough and not would_hold(rows, contact, estimate)
+            doubt |= slip > memory.enough and not would_hold(rows, contact)
         else:
             contact.extrapolated = slip
             contact.predicted = max(slip + contact.bias, 0.0)
-            surely = STEADIER if rigid and feedback(contact, estimate) > FEEDBACK else 1.0
+            surely = STEADIER if rigid and feedback(rows, contact) > FEEDBACK else 1.0
             doubt |= contact.error > memory.enough * surely
         # the force of a rigid contact will change by a weight
         changes = abs(normal) > memory.gravity or (contact.predicted == 0 and slip > memory.gravity)
@@ -228,13 +226,13 @@ def power(rows: Any) -> float:
 
 
 @kernel
-def would_hold(rows: Any, contact: Any, estimate: Any) -> bool:
+def would_hold(rows: Any, contact: Any) -> bool:
     """Whether a contact would stick: the forces for it, from it alone, are within the cone."""
     load, square = 0.0, 0.0
     for k in range(contact.dim):
         row = rows[k]
         lacks = row.residual + row.R * (row.remembered - row.held)
-        force = row.remembered - lacks / (estimate[contact.address + k] + row.R)
+        force = row.remembered - lacks / (row.estimate + row.R)
         if k == 0:
             load = force
         else:

@@ -95,6 +95,8 @@ ROW = np.dtype(
         # contact, or -1; the next unit of its island
         *((name, _i4) for name in ("dim", "contact", "next")),
         ("surface", _f8),  # velocity that surfaces have on their bodies, m s-1
+        ("velocity", _f8),  # as MuJoCo has it, m s-1
+        ("estimate", _f8),  # of the inverse mass that it moves, MuJoCo's, kg-1
         # what mjData had before, and what it was told
         *((name, _f8) for name in ("given_R", "given_reference", "told")),
         ("R", _f8),  # regularisation: acceleration per force, kg-1

@@ -14,7 +14,16 @@ from .compiling import kernel
 from .contacts import cosine, smaller_radius
 from .engine import integers, mj_factorM, mj_fwdActuation, mjd_smooth_vel, reals
 from .friction import shift
-from .memory import CONTACT_ROW, DRY, OPEN, SLIDES, contacts_of, rows_of, rows_of_contact
+from .memory import (
+    CONTACT_ROW,
+    DRY,
+    OPEN,
+    SLIDES,
+    contacts_of,
+    dry_rows_of,
+    rows_of,
+    rows_of_contact,
+)
 from .parameters import ALIGNED, APART, BOUNCES, NARROW, STUCK, USUAL_STEP
 from .rows import times
 from .vectors import dot, plus
@@ -26,20 +35,20 @@ from .vectors import dot, plus
 def stiffen(model: Any, data: Any, memory: Any) -> None:
     """Make contacts and dry friction stiff, and let them ask for velocities at the end of the
     step."""
-    rows, h = rows_of(memory), model.opt.timestep
-    estimate, velocity = reals(data.efc_diagA, data.nefc), reals(data.efc_vel, data.nefc)
+    h = model.opt.timestep
     for contact in contacts_of(memory):
-        first = contact.address
-        goal = velocity_to_ask_for(model, memory, contact, velocity[first], estimate[first])
+        rows = rows_of_contact(memory, contact)
+        goal = velocity_to_ask_for(model, memory, contact, rows[0])
         if memory.bounces:
             goal = bounced(model, data, memory, contact, goal)
-        factor = memory.law.regularisation * estimate[first] / rows[first].R
-        for r in range(first, first + contact.dim):
-            rows[r].R *= factor
-            rows[r].reference = ((goal if r == first else 0.0) - velocity[r]) / h
-    for r in range(memory.first_dry, memory.first_dry + memory.dry):
-        rows[r].R = memory.law.regularisation * estimate[r]
-        rows[r].reference = -velocity[r] / h
+        factor = memory.law.regularisation * rows[0].estimate / rows[0].R
+        for row in rows:
+            row.R *= factor
+            row.reference = -row.velocity / h
+        rows[0].reference = (goal - rows[0].velocity) / h
+    for row in dry_rows_of(memory):
+        row.R = memory.law.regularisation * row.estimate
+        row.reference = -row.velocity / h
 
 
 @kernel
@@ -63,11 +72,9 @@ def depth_kept(model: Any, memory: Any, contact: Any) -> float:
 
 
 @kernel
-def velocity_to_ask_for(
-    model: Any, memory: Any, contact: Any, speed: float, estimate: float
-) -> float:
-    """Normal velocity that closes a gap in the step, or takes a share of a depth away, m s-1; by
-    that which the contact has, `speed`, and the inverse mass that the engine estimates, kg-1.
+def velocity_to_ask_for(model: Any, memory: Any, contact: Any, normal: Any) -> float:
+    """Velocity of a contact's normal row that closes a gap in the step, or takes a share of a depth
+    away, m s-1.
 
     Of the gap of a contact that has borne something, and would close under that and a weight, it
     takes the same share: closed at once, that would be an impact. (Points of contact jump by the
@@ -76,11 +83,12 @@ def velocity_to_ask_for(
     """
     h, law = model.opt.timestep, memory.law
     if contact.gap > 0:
-        closes = contact.gap < h * (h * (memory.gravity + estimate * contact.load) - speed)
+        closing = h * (memory.gravity + normal.estimate * contact.load) - normal.velocity
+        closes = contact.gap < h * closing
         return float(-contact.gap / h * (law.push if closes and contact.load > 0 else 1.0))
     kept = depth_kept(model, memory, contact)
     fastest = math.inf if is_moved_by_hand(model, contact) else h * memory.gravity
-    if estimate * rows_of(memory)[contact.address].remembered > STUCK * memory.gravity:
+    if normal.estimate * normal.remembered > STUCK * memory.gravity:
         fastest = 0.0
     return float(min(law.push * max(-contact.gap - kept, 0.0) / h, fastest))
 
@@ -95,8 +103,8 @@ def bounced(model: Any, data: Any, memory: Any, contact: Any, goal: float) -> fl
     if share == 0:
         return goal
     free = reals(data.qacc_smooth, model.nv)  # of the last step, without impacts
-    speed = reals(data.efc_vel, data.nefc)[contact.address]
-    fall = h * max(-times(memory, rows_of(memory)[contact.address], free), 0.0)
+    normal = rows_of_contact(memory, contact)[0]
+    speed, fall = normal.velocity, h * max(-times(memory, normal, free), 0.0)
     parts = speed > BOUNCES * h * memory.gravity
     comes = contact.load == 0 and contact.gap + h * (speed - fall) > 0
     if parts or comes:
@@ -230,32 +238,30 @@ def take_depth_away(model: Any, data: Any, memory: Any) -> None:
 
 
 @kernel
-def oppose_slip_at_mid_step(model: Any, data: Any, memory: Any) -> bool:
+def oppose_slip_at_mid_step(model: Any, memory: Any) -> bool:
     """Let friction of what slides fast oppose its slip at mid step; whether there is any.
 
     That is of second order, by the Jacobian of where bodies are: velocities lie half a step to
     either side. Where slip may end within the step, it must oppose that at the end, and in an
     impact, where a load changes by more than a weight, that after it (Moreau).
     """
-    h, some, estimate = model.opt.timestep, False, reals(data.efc_diagA, data.nefc)
-    velocities = reals(data.efc_vel, data.nefc)
+    h, some = model.opt.timestep, False
     for contact in contacts_of(memory):
         rows = rows_of_contact(memory, contact)
         gained = rows[0].remembered - contact.load
-        impact = abs(gained) * estimate[contact.address] > memory.gravity
+        impact = abs(gained) * rows[0].estimate > memory.gravity
         if contact.state != SLIDES or contact.predicted == 0 or impact:
             continue
-        speed, change, velocity = 0.0, 0.0, velocities[contact.address :]
+        speed, change = 0.0, 0.0
         for t in range(contact.dim - 1):
             row = rows[1 + t]
-            speed += (contact.mu[t] * velocity[1 + t]) ** 2
+            speed += (contact.mu[t] * row.velocity) ** 2
             change += (contact.mu[t] * (row.residual + row.reference)) ** 2
         if speed <= (memory.law.fast * h) ** 2 * change:
             continue
         for t in range(contact.dim - 1):
             row = rows[1 + t]
-            more = velocity[1 + t] / h
-            more -= contact.turned[1 + t] if t < 2 else 0.0
+            more = row.velocity / h - (contact.turned[1 + t] if t < 2 else 0.0)
             row.reference -= more
             row.residual += more
         contact.extrapolated = shift(rows, contact)

@@ -51,12 +51,14 @@ def find_surfaces(model: Any, data: Any, memory: Any) -> None:
 
 @kernel
 def read_rows(data: Any, memory: Any) -> None:
-    """Read MuJoCo's regularisation and reference acceleration of all rows. They hold what they
-    remember, but for the loads of soft contacts."""
+    """Read what MuJoCo has of all rows. They hold what they remember, but for the loads of soft
+    contacts."""
     rows = rows_of(memory)
     R, reference = reals(data.efc_R, data.nefc), reals(data.efc_aref, data.nefc)
+    velocity, estimate = reals(data.efc_vel, data.nefc), reals(data.efc_diagA, data.nefc)
     for r in range(len(rows)):
         row = rows[r]
+        row.velocity, row.estimate = velocity[r], estimate[r]
         row.R = row.given_R = R[r]
         row.reference = row.given_reference = reference[r]
         row.held = row.remembered
@@ -131,15 +133,18 @@ def find_turning(
     Of what slides softly there is none, unless friction could end that within the contact's time:
     else that would never end on a turntable.
     """
-    rigid, sticks = memory.law.rigid, contact.state == STICKS
-    velocity, first = reals(data.efc_vel, data.nefc), contact.address
-    damping = reals(data.efc_KBIP, (data.nefc, 4))[first + 1, 1] if known else 0.0
+    rigid, sticks, rows = (
+        memory.law.rigid,
+        contact.state == STICKS,
+        rows_of_contact(memory, contact),
+    )
+    damping = reals(data.efc_KBIP, (data.nefc, 4))[contact.address + 1, 1] if known else 0.0
     lost = 1.0 if rigid else min(model.opt.timestep * damping, 1.0)
-    slip = math.hypot(velocity[first + 1], velocity[first + 2]) if known else 0.0
-    stops = contact.mu[0] * contact.load * reals(data.efc_diagA, data.nefc)[first]
+    slip = math.hypot(rows[1].velocity, rows[2].velocity) if known else 0.0
+    stops = contact.mu[0] * contact.load * rows[0].estimate
     known = known and (rigid or sticks or slip * damping < stops)
     for axis in range(3):
         contact.turned[axis] = 0.0
         if known and (axis > 0 or (rigid and sticks and contact.load > 0)):
-            change = velocity[first + axis] - dot(contact.frame[axis], contact.velocity)
+            change = rows[axis].velocity - dot(contact.frame[axis], contact.velocity)
             contact.turned[axis] = change * (1 - lost / 2) / since

@@ -85,7 +85,7 @@ def law_of_a_step(m: int, d: int, at: int) -> None:
     if predict_slip(model, data, memory) or not known:
         solve(model, data, memory, known)
     elif rigid:
-        oppose_slip_at_mid_step(model, data, memory)
+        oppose_slip_at_mid_step(model, memory)
     if rigid:
         write_regularisation(data, memory)
     write_references(data, memory)
@@ -239,7 +239,7 @@ def solve_rigid(model: Any, data: Any, memory: Any, start: Any) -> bool:
     soften(memory)
     solved = solve_contacts(model, data, memory, start, 1.0)
     find_residuals(memory, start, False)
-    if oppose_slip_at_mid_step(model, data, memory):
+    if oppose_slip_at_mid_step(model, memory):
         solved &= solve_contacts(model, data, memory, start, R_LEAST)
     extrapolate_slip(model, data, memory)
     return bool(solved)
