@@ -34,7 +34,7 @@ from .engine import (
     reals,
 )
 from .memory import NEW, contacts_at, contacts_of
-from .parameters import ACROSS, AT_MOST, CORNER, FARTHEST, UNMOVED
+from .parameters import ACROSS, AT_MOST, FARTHEST, UNMOVED
 from .rigid import depth_kept
 
 
@@ -58,9 +58,8 @@ def put_points_back(model: Any, data: Any, memory: Any) -> bool:
         if not is_lost(data, memory, old, min(near, far)):  # floors may be much larger
             continue
         complete_frame(old.frame)
-        if widest_angle(data, old) > CORNER:
-            add_point(data, memory, old)
-            added += 1
+        add_point(data, memory, old)
+        added += 1
     if added:
         make_rows_anew(memory)
     return added > 0
@@ -225,30 +224,6 @@ def complete_frame(frame: Any) -> None:
     for j in range(3):
         one, two = (j + 1) % 3, (j + 2) % 3
         along[j] = normal[one] * across[two] - normal[two] * across[one]
-
-
-@kernel
-def widest_angle(data: Any, old: Any) -> float:
-    """The widest angle without other points of the patch that a lost point sees, rad."""
-    found, widest = engine_contacts(data.contact, data.ncon), 0.0
-    for i in range(data.ncon):
-        if is_of_face(found[i].geom, found[i].frame, old):
-            angle, gap = angle_to(found[i].pos, old), 2 * math.pi
-            for k in range(data.ncon):
-                if k != i and is_of_face(found[k].geom, found[k].frame, old):
-                    gap = min(gap, (angle_to(found[k].pos, old) - angle) % (2 * math.pi))
-            widest = max(widest, gap)
-    return widest
-
-
-@kernel
-def angle_to(pos: Any, old: Any) -> float:
-    """Direction in which a place is seen from a lost point, in its tangents, rad."""
-    x, y = 0.0, 0.0
-    for j in range(3):
-        x += old.frame[1, j] * (pos[j] - old.pos[j])
-        y += old.frame[2, j] * (pos[j] - old.pos[j])
-    return math.atan2(y, x)
 
 
 @kernel
