@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -100,8 +99,6 @@ USUAL_STEP = 2e-3
 ITERATIONS = 20
 """Iterations of the implicit midpoint rule; each takes the angle of half a step, rad, from the
 error, as a factor."""
-CORNER = 1.05 * math.pi
-"""Angle without other points of its patch that a corner of the patch sees at least."""
 STEPS = 20
 """Factorisations that Newton's method may take for an island with one R."""
 EXACT, ROUGH = 1e-9, 1e-6

@@ -36,11 +36,12 @@ from .engine import (
 from .memory import NEW, contacts_at, contacts_of
 from .parameters import ACROSS, AT_MOST, FARTHEST, UNMOVED
 from .rigid import depth_kept
+from .turning import cross, dot, plus, times_vector, vector_at
 
 
 @kernel
 def put_points_back(model: Any, data: Any, memory: Any) -> bool:
-    """Put back corners of flat contacts that the collider has dropped while they overlap.
+    """Put back points of flat contacts that the collider has dropped while they overlap.
 
     Returns whether there were any: the constraint rows are then made anew.
     """
@@ -53,13 +54,10 @@ def put_points_back(model: Any, data: Any, memory: Any) -> bool:
         if not 1.99 * far**2 < old.moved < math.inf:  # what is nearer has rolled
             continue
         place_lost_point(model, data, old)
-        if old.gap >= 0 or old.moved >= (near / 10) ** 2:
-            continue
-        if not is_lost(data, memory, old, min(near, far)):  # floors may be much larger
-            continue
-        complete_frame(old.frame)
-        add_point(data, memory, old)
-        added += 1
+        overlaps = old.gap < 0 and old.moved < (near / 10) ** 2
+        if overlaps and is_lost(data, memory, old, min(near, far)):  # floors may be much larger
+            add_point(data, memory, old)
+            added += 1
     if added:
         make_rows_anew(memory)
     return added > 0
@@ -110,7 +108,6 @@ def add_points_without_margin(model: Any, data: Any, memory: Any, like: Any) -> 
         for j in range(3):
             like.pos[j], like.frame[0, j] = point[1 + j], point[4 + j]
         if like.gap < 0 and not has_near(data, like, near):
-            complete_frame(like.frame)
             add_point(data, memory, like)
             added += 1
     read_place(like, engine_contacts(data.contact, data.ncon)[like.index])
@@ -210,30 +207,16 @@ def has_near(data: Any, contact: Any, near: float) -> bool:
 
 
 @kernel
-def complete_frame(frame: Any) -> None:
-    """Give a normal two tangents."""
-    normal, across, along, thin = frame[0], frame[1], frame[2], 0
-    for j in range(1, 3):  # the axis that is farthest from the normal
-        thin = j if abs(normal[j]) < abs(normal[thin]) else thin
-    for j in range(3):
-        one, two = (j + 1) % 3, (j + 2) % 3
-        across[j] = normal[one] * (two == thin) - normal[two] * (one == thin)
-    length = math.sqrt(across[0] ** 2 + across[1] ** 2 + across[2] ** 2)
-    for j in range(3):
-        across[j] /= length
-    for j in range(3):
-        one, two = (j + 1) % 3, (j + 2) % 3
-        along[j] = normal[one] * across[two] - normal[two] * across[one]
-
-
-@kernel
 def add_point(data: Any, memory: Any, old: Any) -> None:
     """Add a lost point to mjData, else as the last of its pair of geoms there is."""
     copy(data.contact + SIZE * old.index, memory.point_at, WORDS)
     point = engine_contacts(memory.point_at, 1)[0]
+    normal, along = vector_at(old.frame[0], 0), vector_at(point.frame, 3)
+    along = plus(along, -dot(along, normal), normal)
+    along = times_vector(1 / math.sqrt(dot(along, along)), along)
+    across = cross(normal, along)
     point.dist = old.gap
     for j in range(3):
         point.pos[j] = old.pos[j]
-        for axis in range(3):
-            point.frame[3 * axis + j] = old.frame[axis, j]
+        point.frame[j], point.frame[3 + j], point.frame[6 + j] = normal[j], along[j], across[j]
     mj_addContact(memory.model, memory.data, memory.point_at)
