@@ -375,11 +375,10 @@ def nearest(model: Any, memory: Any, old: Any) -> int:
 
 @kernel
 def match(model: Any, data: Any, memory: Any) -> float:
-    """Let contacts inherit from those before; if two have become one, or one may have hopped, how
-    far one has moved, m."""
+    """Let contacts inherit from those before; how far one has moved on its bodies at most, m."""
     contacts, before = contacts_of(memory), contacts_at(memory.before_at, memory.contacts_before)
     sort_pairs(model, memory)
-    farthest, some_merged = 0.0, False
+    farthest = 0.0
     for i in range(len(before)):
         old = before[i]
         k = i if i < len(contacts) and square_apart(contacts[i], old) < UNMOVED**2 else -1
@@ -389,10 +388,8 @@ def match(model: Any, data: Any, memory: Any) -> float:
             old.moved = square_apart(contacts[k], old) if k >= 0 else math.inf
         if k >= 0:
             farthest = max(farthest, old.moved)
-            hopped = memory.law.rigid and hops(model, old.geoms)
-            some_merged = some_merged or contacts[k].state != NEW or hopped
             inherit(model, data, memory, contacts[k], old)
-    return math.sqrt(farthest / 2) if some_merged else 0.0
+    return math.sqrt(farthest / 2)
 
 
 @kernel

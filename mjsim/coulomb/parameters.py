@@ -71,6 +71,9 @@ UNMOVED = 1e-6
 ALIKE, FARTHEST = 0.1, 0.2
 """Part by which the ways of a contact that rolls over its bodies may differ; the longest in a step,
 in units of the smaller radius: what goes farther has jumped."""
+FASTER = 10.0
+"""How much faster a contact may roll over bodies than these turn, without having jumped: on a disc
+that leans by 6°."""
 AT_MOST = 2.0
 """Depth that a contact has at most when it is new, in units of the way that its bodies close in a
 step."""

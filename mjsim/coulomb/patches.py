@@ -17,6 +17,7 @@ from .contacts import (
     read_place,
     same_geoms,
     smaller_radius,
+    spin,
 )
 from .engine import (
     BOX,
@@ -34,7 +35,7 @@ from .engine import (
     reals,
 )
 from .memory import NEW, contacts_at, contacts_of
-from .parameters import ACROSS, AT_MOST, FARTHEST, UNMOVED
+from .parameters import ACROSS, AT_MOST, FARTHEST, FASTER, UNMOVED
 from .rigid import depth_kept
 from .turning import cross, dot, plus, times_vector, vector_at
 
@@ -49,13 +50,16 @@ def put_points_back(model: Any, data: Any, memory: Any) -> bool:
     radius = reals(model.geom_rbound, model.ngeom)
     for i in range(len(before)):
         old = before[i]
-        near = memory.law.near * max(radius[old.geoms[0]], radius[old.geoms[1]])
-        far = FARTHEST * smaller_radius(model, old.geoms)
-        if not 1.99 * far**2 < old.moved < math.inf:  # what is nearer has rolled
+        one, other = radius[old.geoms[0]], radius[old.geoms[1]]
+        least, far = memory.law.near * max(one, other), FARTHEST * smaller_radius(model, old.geoms)
+        near = min(least, far)  # floors may be much larger
+        turned = one * spin(model, data, old, 0) + other * spin(model, data, old, 1)
+        rolled = min(FASTER * turned * model.opt.timestep, far)
+        if not 2 * max(near, rolled) ** 2 < old.moved < math.inf:
             continue
         place_lost_point(model, data, old)
-        overlaps = old.gap < 0 and old.moved < (near / 10) ** 2
-        if overlaps and is_lost(data, memory, old, min(near, far)):  # floors may be much larger
+        overlaps = old.gap < 0 and old.moved < (least / 10) ** 2
+        if overlaps and is_lost(data, memory, old, near):
             add_point(data, memory, old)
             added += 1
     if added:

@@ -789,6 +789,26 @@ def test_points_that_the_collider_adds_for_a_step_jolt_nothing(rigid, apart):
     assert rigid or apart or len(counts) > 1  # the collider does add points
 
 
+@pytest.mark.parametrize("corners", [3, 6, 12])
+def test_what_has_more_points_than_the_collider_takes_comes_to_rest(corners):
+    """A prism that lands on a cylinder, on a table: one point takes the place of another, steps
+    away, and both rocked at 3e-5 rad/s for ever."""
+    ring = 0.1 * np.exp(2j * np.pi * np.arange(corners) / corners)
+    mesh = " ".join(f"{at.real} {at.imag} {z}" for at in ring for z in (-0.05, 0.05))
+    bodies = '<geom type="box" size=".5 .5 .1"/>'
+    bodies += free("below", "0 0 .151", 'type="cylinder" size=".1 .05"')
+    bodies += free("above", ".03 .02 .2525", 'type="mesh" mesh="prism"', euler="3 2 20")
+    asset = f'<asset><mesh name="prism" vertex="{mesh}"/></asset>'
+    made, data = world(bodies, more=asset, mu=1.0)
+    data.qvel[6], data.qvel[-1], fastest = 0.3, 6.0, 0.0
+    law = Coulomb(made, rigid=True)
+    law.step(data, 1000)
+    for _ in range(2000):
+        law.step(data)
+        fastest = max(fastest, np.abs(data.qvel).max())
+    assert fastest < 1e-9
+
+
 @pytest.mark.parametrize("corners", [6, 7])
 def test_corners_that_the_collider_takes_by_turns_jolt_nothing(corners):
     """Four of a polygon, of a prism that rests on a slope; it crept as in plain MuJoCo."""
