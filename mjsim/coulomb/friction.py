@@ -81,24 +81,18 @@ def project(rows: Any, contact: Any) -> int:
     This is what MuJoCo's solver has (computation chapter, elliptic cone).
     """
     normal, square = rows[0], 0.0
-    if contact.dim == 1:
-        normal.force = max(-normal.residual / normal.R, 0.0)
-        return STICKS if normal.force > 0 else OPEN
-    along = contact.cone * normal.residual
     for t in range(contact.dim - 1):
         square += (contact.mu[t] * rows[1 + t].residual) ** 2
     across = math.sqrt(square)
-    if along >= contact.cone * across:
+    if normal.residual >= across:
         for row in rows:
             row.force = 0.0
         return OPEN
-    if contact.cone * along + across <= 0:
+    if contact.cone**2 * normal.residual + across <= 0:
         for row in rows:
             row.force = -row.residual / row.R
         return STICKS
-    normal.force = (contact.cone * across - along) / (
-        normal.R * contact.cone * (1 + contact.cone * contact.cone)
-    )
+    normal.force = (across - normal.residual) / (normal.R * (1 + contact.cone**2))
     for t in range(contact.dim - 1):
         rows[1 + t].force = -normal.force / across * contact.mu[t] ** 2 * rows[1 + t].residual
     return SLIDES

@@ -26,7 +26,7 @@ from .memory import (
 )
 from .parameters import ALIGNED, APART, BOUNCES, NARROW, STUCK, USUAL_STEP
 from .rows import times
-from .vectors import dot, plus
+from .vectors import NONE, applied, cross, dot, plus, times_vector
 
 # -- contacts --------------------------------------------------------------------------------------
 
@@ -99,7 +99,8 @@ def bounced(model: Any, data: Any, memory: Any, contact: Any, goal: float) -> fl
 
     What an impact makes touch, or touch again, bounces in the next step.
     """
-    share, h = restitution_of(memory, contact), model.opt.timestep
+    given, h = reals(memory.restitution_at, memory.bounces), model.opt.timestep
+    share = max(given[contact.geoms[0]], given[contact.geoms[1]])
     if share == 0:
         return goal
     free = reals(data.qacc_smooth, model.nv)  # of the last step, without impacts
@@ -110,14 +111,6 @@ def bounced(model: Any, data: Any, memory: Any, contact: Any, goal: float) -> fl
     if parts or comes:
         return float(-APART * h)
     return float(max(goal, rebound(share, contact.gap, speed, fall, h)))
-
-
-@kernel
-def restitution_of(memory: Any, contact: Any) -> float:
-    """Share of its normal speed with which a contact parts after an impact: the larger of its
-    geoms'."""
-    given = reals(memory.restitution_at, memory.bounces)
-    return float(max(given[contact.geoms[0]], given[contact.geoms[1]]))
 
 
 @kernel
@@ -171,27 +164,25 @@ def same_face(model: Any, one: Any, other: Any) -> bool:
 
 @kernel
 def hold_on_a_plane(model: Any, memory: Any, first: int, after: int) -> None:
-    """Hold the loads a + b x + c y that are nearest to those of contacts, places from their
-    middle; gaps within the depth that is kept count as closed."""
-    contacts, rows, count = contacts_of(memory), rows_of(memory), after - first
-    middle_x, middle_y, a = 0.0, 0.0, 0.0
+    """Hold the loads p (1, x, y) that are nearest to those of contacts, by their normal equations;
+    gaps within the depth that is kept count as closed."""
+    contacts, rows = contacts_of(memory), rows_of(memory)
+    ones, along, across, loads = NONE, NONE, NONE, NONE
     for i in range(first, after):
-        x, y = in_plane(contacts[first], contacts[i])
-        middle_x, middle_y = middle_x + x / count, middle_y + y / count
-        a += rows[contacts[i].address].remembered / count
-    xx, xy, yy, load_x, load_y = 0.0, 0.0, 0.0, 0.0, 0.0
-    for i in range(first, after):
-        x, y = in_plane(contacts[first], contacts[i])
-        x, y, load = x - middle_x, y - middle_y, rows[contacts[i].address].remembered
-        xx, xy, yy = xx + x * x, xy + x * y, yy + y * y
-        load_x, load_y = load_x + load * x, load_y + load * y
-    area = xx * yy - xy * xy
-    if area <= NARROW * (xx + yy) ** 2:  # they lie on a line
+        place = in_plane(contacts[first], contacts[i])
+        ones, loads = (
+            plus(ones, 1.0, place),
+            plus(loads, rows[contacts[i].address].remembered, place),
+        )
+        along, across = plus(along, place[1], place), plus(across, place[2], place)
+    volume = dot(ones, cross(along, across))
+    spread = along[1] + across[2] - (ones[1] ** 2 + ones[2] ** 2) / ones[0]
+    if volume <= NARROW * ones[0] * spread**2:  # they lie on a line
         return
-    b, c = (load_x * yy - load_y * xy) / area, (load_y * xx - load_x * xy) / area
+    inverse = cross(along, across), cross(across, ones), cross(ones, along)
+    plane = times_vector(1 / volume, applied(inverse, loads))
     for i in range(first, after):
-        x, y = in_plane(contacts[first], contacts[i])
-        rows[contacts[i].address].held = a + b * (x - middle_x) + c * (y - middle_y)
+        rows[contacts[i].address].held = dot(plane, in_plane(contacts[first], contacts[i]))
         leave_gap(model, memory, contacts[i])
 
 
@@ -205,9 +196,9 @@ def leave_gap(model: Any, memory: Any, contact: Any) -> None:
 
 @kernel
 def in_plane(one: Any, other: Any) -> Any:
-    """Where a contact is in the tangents of another one, m."""
+    """One, and where a contact is in the tangents of another one, m."""
     way = plus(other.pos, -1.0, one.pos)
-    return dot(one.frame[1], way), dot(one.frame[2], way)
+    return 1.0, dot(one.frame[1], way), dot(one.frame[2], way)
 
 
 @kernel

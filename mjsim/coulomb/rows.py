@@ -8,7 +8,7 @@ from typing import Any
 from .compiling import kernel
 from .engine import reals
 from .memory import STICKS, columns_of, contacts_of, jacobian_of, rows_of, rows_of_contact
-from .vectors import dot, plus
+from .vectors import NONE, dot, plus
 
 
 @kernel
@@ -99,7 +99,7 @@ def store_velocities(model: Any, data: Any, memory: Any) -> None:
     """Store how contacts part and slip, by the last Jacobians and the velocities now."""
     velocity = reals(data.qvel, model.nv)
     for contact in contacts_of(memory):
-        rows, total = rows_of_contact(memory, contact), (0.0, 0.0, 0.0)
+        rows, total = rows_of_contact(memory, contact), NONE
         contact.belt = 0.0
         for axis in range(min(contact.dim, 3)):
             speed = times(memory, rows[axis], velocity) + rows[axis].surface

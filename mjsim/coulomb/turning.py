@@ -10,7 +10,7 @@ from .compiling import kernel
 from .engine import integers, reals
 from .memory import bodies_at
 from .parameters import ITERATIONS
-from .vectors import applied, cross, dot, plus, rotated, times_vector, vector_at
+from .vectors import NONE, applied, cross, dot, plus, rotated, times_vector, vector_at
 
 FREE, SLIDE = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 
@@ -49,7 +49,7 @@ def add_moment_of(model: Any, data: Any, free: Any, known: bool, over: bool) -> 
     """The gyroscopic moment of a free body, in its own axes, and the force on its origin."""
     bias, h = reals(data.qfrc_bias, model.nv), model.opt.timestep
     mass, inertia, axes, spin, arm = motion_of(model, data, free.body)
-    momentum, pushed = applied(inertia, spin), (0.0, 0.0, 0.0)
+    momentum, pushed = applied(inertia, spin), NONE
     if known and over:
         gained = plus(momentum, -1.0, applied(axes, vector_at(free.coasting, 0)))
         pushed = rotated(gained, times_vector(-h, spin))

@@ -7,6 +7,8 @@ from typing import Any
 
 from .compiling import kernel
 
+NONE = 0.0, 0.0, 0.0
+
 
 @kernel
 def cross(a: Any, b: Any) -> Any:
