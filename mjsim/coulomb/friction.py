@@ -14,16 +14,7 @@ from typing import Any
 from .compiling import kernel
 from .contacts import axis_of, kind_of
 from .engine import engine_contacts, reals
-from .memory import (
-    NEW,
-    OPEN,
-    SLIDES,
-    STICKS,
-    contacts_of,
-    dry_of,
-    dry_rows_of,
-    rows_of_contact,
-)
+from .memory import NEW, OPEN, SLIDES, STICKS, contacts_of, dry_of, dry_rows_of, rows_of_contact
 from .parameters import FEEDBACK, SLOWEST, STEADIER
 from .rows import find_residuals
 

@@ -169,11 +169,8 @@ def hold_on_a_plane(model: Any, memory: Any, first: int, after: int) -> None:
     contacts, rows = contacts_of(memory), rows_of(memory)
     ones, along, across, loads = NONE, NONE, NONE, NONE
     for i in range(first, after):
-        place = in_plane(contacts[first], contacts[i])
-        ones, loads = (
-            plus(ones, 1.0, place),
-            plus(loads, rows[contacts[i].address].remembered, place),
-        )
+        place, load = in_plane(contacts[first], contacts[i]), rows[contacts[i].address].remembered
+        ones, loads = plus(ones, 1.0, place), plus(loads, load, place)
         along, across = plus(along, place[1], place), plus(across, place[2], place)
     volume = dot(ones, cross(along, across))
     spread = along[1] + across[2] - (ones[1] ** 2 + ones[2] ** 2) / ones[0]

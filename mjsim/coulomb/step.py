@@ -5,49 +5,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from . import contacts, edges, friction, patches, rigid, rows, turning
 from .compiling import kernel
-from .contacts import copy_jacobians, find, match, nothing_moved, read_gaps, remember_forces
-from .edges import leave_inner_edges_out
-from .engine import (
-    datas,
-    mj_fwdAcceleration,
-    mj_fwdActuation,
-    mj_fwdConstraint,
-    models,
-    reals,
-)
-from .friction import (
-    extrapolate_slip,
-    find_forces,
-    predict_slip,
-    store_forces,
-    strengthen,
-    weaken,
-)
+from .engine import datas, mj_fwdAcceleration, mj_fwdActuation, mj_fwdConstraint, models, reals
 from .memory import contacts_of, memories, rows_of, rows_of_contact
 from .newton import solve_contacts
 from .parameters import EARTH, NEXT, OVER, R_LEAST, SOFTER
-from .patches import add_points_below, leave_added_points_out, put_points_back
-from .rigid import (
-    add_dampers,
-    oppose_slip_at_mid_step,
-    share_loads,
-    stiffen,
-    take_dampers_away,
-    take_depth_away,
-    write_regularisation,
-)
-from .rows import (
-    add_turning,
-    find_residuals,
-    find_surfaces,
-    hold,
-    put_rows_back,
-    read_rows,
-    store_velocities,
-    write_references,
-)
-from .turning import add_gyroscopic_moments, turn_accelerations
 from .vectors import dot
 
 
@@ -61,34 +24,33 @@ def law_of_a_step(m: int, d: int, at: int) -> None:
     """
     model, data, memory = models(m, 1)[0], datas(d, 1)[0], memories(at, 1)[0]
     memory.model, memory.data = m, d
-    rigid = memory.law.rigid
-    put_rows_back(data, memory)
-    take_dampers_away(model, data, memory)
+    rows.put_rows_back(data, memory)
+    rigid.take_dampers_away(model, data, memory)
     if memory.law.kinetic < 1:
-        strengthen(data, memory)
+        friction.strengthen(data, memory)
     known, over, since = begin(model, data, memory)
-    if data.ncon == 0 and not rigid:  # nothing touches: all is MuJoCo's own
+    if data.ncon == 0 and not memory.law.rigid:  # nothing touches: all is MuJoCo's own
         forget_contacts(memory)
         return
     memory.gravity = size_of_gravity(model)
     memory.enough = memory.law.share * memory.gravity
-    if rigid:
-        add_dampers(model, data, memory)
-    moved = not known or not nothing_moved(model, data, memory)
+    if memory.law.rigid:
+        rigid.add_dampers(model, data, memory)
+    moved = not known or not contacts.nothing_moved(model, data, memory)
     update_contacts(model, data, memory, known, over, moved)
     if memory.free_bodies:
-        add_gyroscopic_moments(model, data, memory, known, over)
+        turning.add_gyroscopic_moments(model, data, memory, known, over)
     memory.pending = memory.contacts + memory.dry > 0
     if not memory.pending:
         return
     find_references(model, data, memory, since, moved)
-    if predict_slip(model, data, memory) or not known:
+    if friction.predict_slip(model, data, memory) or not known:
         solve(model, data, memory, known)
-    elif rigid:
-        oppose_slip_at_mid_step(model, memory)
-    if rigid:
-        write_regularisation(data, memory)
-    write_references(data, memory)
+    elif memory.law.rigid:
+        rigid.oppose_slip_at_mid_step(model, memory)
+    if memory.law.rigid:
+        rigid.write_regularisation(data, memory)
+    rows.write_references(data, memory)
 
 
 @kernel
@@ -99,39 +61,39 @@ def update_contacts(
     if over:
         keep_forces(memory)
     if not moved:
-        read_gaps(data, memory)
+        contacts.read_gaps(data, memory)
         return
     hand_on(model, data, memory, known)
-    find(model, data, memory)
+    contacts.find(model, data, memory)
     anew = False
-    if match(model, data, memory) > memory.least:
-        anew = put_points_back(model, data, memory)
+    if contacts.match(model, data, memory) > memory.least:
+        anew = patches.put_points_back(model, data, memory)
     if memory.law.rigid:
-        anew |= add_points_below(model, data, memory)
-    if anew or leave_added_points_out(model, data, memory):
-        find(model, data, memory)
-        match(model, data, memory)
-    if leave_inner_edges_out(model, data, memory):
-        find(model, data, memory)
-        match(model, data, memory)
-    copy_jacobians(model, data, memory)
-    find_surfaces(model, data, memory)
-    remember_forces(memory)
+        anew |= patches.add_points_below(model, data, memory)
+    if anew or patches.leave_added_points_out(model, data, memory):
+        contacts.find(model, data, memory)
+        contacts.match(model, data, memory)
+    if edges.leave_inner_edges_out(model, data, memory):
+        contacts.find(model, data, memory)
+        contacts.match(model, data, memory)
+    contacts.copy_jacobians(model, data, memory)
+    rows.find_surfaces(model, data, memory)
+    contacts.remember_forces(memory)
 
 
 @kernel
 def find_references(model: Any, data: Any, memory: Any, since: float, moved: bool) -> None:
     """Find what rows ask for: MuJoCo's references, mended."""
-    read_rows(data, memory)
+    rows.read_rows(data, memory)
     if memory.law.rigid:
-        stiffen(model, data, memory)
+        rigid.stiffen(model, data, memory)
     elif memory.law.servo:
-        take_depth_away(model, data, memory)
-    add_turning(model, data, memory, since, moved)
+        rigid.take_depth_away(model, data, memory)
+    rows.add_turning(model, data, memory, since, moved)
     if memory.law.kinetic < 1:
-        weaken(model, data, memory)
+        friction.weaken(model, data, memory)
     if memory.law.rigid:
-        share_loads(model, memory)
+        rigid.share_loads(model, memory)
 
 
 @kernel
@@ -159,7 +121,7 @@ def begin(model: Any, data: Any, memory: Any) -> Any:
         if abs(start[i]) < memory.law.calm:
             start[i] = 0.0
     if known and over:
-        turn_accelerations(model, data, memory, elapsed)
+        turning.turn_accelerations(model, data, memory, elapsed)
     return known, over, since
 
 
@@ -175,7 +137,7 @@ def conclude(model: Any, data: Any, memory: Any) -> None:
     """Find the contact forces with which a step has ended, if that wasn't done."""
     if memory.pending:
         memory.pending = 0
-        find_forces(model, data, memory)
+        friction.find_forces(model, data, memory)
 
 
 @kernel
@@ -200,8 +162,8 @@ def hand_on(model: Any, data: Any, memory: Any, known: bool) -> None:
 @kernel
 def store(model: Any, data: Any, memory: Any) -> None:
     """Store forces in the axes of bodies, and how contacts part and slip."""
-    store_forces(memory)
-    store_velocities(model, data, memory)
+    friction.store_forces(memory)
+    rows.store_velocities(model, data, memory)
 
 
 @kernel
@@ -238,10 +200,10 @@ def solve_rigid(model: Any, data: Any, memory: Any, start: Any) -> bool:
     it is known what slips."""
     soften(memory)
     solved = solve_contacts(model, data, memory, start, 1.0)
-    find_residuals(memory, start, False)
-    if oppose_slip_at_mid_step(model, memory):
+    rows.find_residuals(memory, start, False)
+    if rigid.oppose_slip_at_mid_step(model, memory):
         solved &= solve_contacts(model, data, memory, start, R_LEAST)
-    extrapolate_slip(model, data, memory)
+    friction.extrapolate_slip(model, data, memory)
     return bool(solved)
 
 
@@ -251,17 +213,17 @@ def iterate(model: Any, data: Any, memory: Any, start: Any) -> bool:
     hold the forces that were."""
     acceleration = reals(data.qacc, model.nv)
     if memory.law.rigid:
-        write_regularisation(data, memory)
+        rigid.write_regularisation(data, memory)
     for _ in range(memory.law.most):
-        write_references(data, memory)
+        rows.write_references(data, memory)
         mj_fwdConstraint(memory.model, memory.data)
         for i in range(model.nv):
             start[i] = acceleration[i]
-        worst = find_forces(model, data, memory)
+        worst = friction.find_forces(model, data, memory)
         for contact in contacts_of(memory):
             contact.extrapolated = -1.0
             if memory.law.rigid:
-                hold(rows_of_contact(memory, contact))
+                rows.hold(rows_of_contact(memory, contact))
         if worst <= memory.enough:
             return True
     return False
