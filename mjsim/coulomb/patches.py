@@ -37,7 +37,7 @@ from .engine import (
 from .memory import NEW, contacts_at, contacts_of
 from .parameters import ACROSS, AT_MOST, FARTHEST, FASTER, UNMOVED
 from .rigid import depth_kept
-from .turning import cross, dot, plus, times_vector, vector_at
+from .vectors import cross, dot, plus, times_vector, vector_at
 
 
 @kernel
