@@ -69,12 +69,13 @@ def serve(m: int, d: int) -> None:
 
 
 @entry
-def finish(m: int, d: int, at: int, storing: bool) -> None:
+def finish(at: int, storing: bool) -> None:
     """Find the forces of the last step, before anybody changes accelerations in mjData.
 
     If they are for `storing`, put them where a state has them.
     """
-    model, data, memory = models(m, 1)[0], datas(d, 1)[0], memories(at, 1)[0]
+    memory = memories(at, 1)[0]
+    model, data = models(memory.model, 1)[0], datas(memory.data, 1)[0]
     conclude(model, data, memory)
     take_dampers_away(model, data, memory)
     if storing and not memory.stored:  # what goes on from here does as what is restored

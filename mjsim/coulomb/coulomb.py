@@ -182,7 +182,7 @@ class Coulomb:
     def _adopt(self, address: int) -> Simulation:
         """A memory for the data at an address, which go on from a restored state, if any."""
         simulation = self._simulations[address] = self._begun()
-        self._restored = None
+        self._restored, simulation.record["data"] = None, address
         simulation.active[0] = CALLBACK.installed(self.model._address)
         return simulation
 
@@ -220,12 +220,11 @@ class Coulomb:
         else:
             simulation = self._begun()
         if simulation.knows and simulation.unsettled:
-            of = simulation.data()
-            if of is None:
+            if simulation.data() is None:
                 raise ValueError(
                     "the data whose last forces are asked for are unknown: state(data)"
                 )
-            finish(self.model._address, of._address, simulation.address, True)
+            finish(simulation.address, True)
         return simulation.state()
 
     def restore(self, state: Mapping[str, npt.NDArray[Any]], data: Any = None) -> None:
@@ -315,7 +314,7 @@ class Coulomb:
             simulation.reset()  # the step was left in its middle
             raise
         finally:
-            finish(self.model._address, data._address, simulation.address, False)
+            finish(simulation.address, False)
             simulation.active[0] = active
             CALLBACK.unset(self.model)
 
