@@ -65,7 +65,7 @@ def serve(m: int, d: int) -> None:
         call(previous, m, d)
     memory = memory_of(m, d)
     if memory and memories(memory, 1)[0].active:
-        law_of_a_step(m, d, memory)
+        law_of_a_step(memory)
 
 
 @entry

@@ -15,15 +15,16 @@ from .vectors import dot
 
 
 @kernel
-def law_of_a_step(m: int, d: int, at: int) -> None:
-    """Apply Coulomb's law: velocities are known, and MuJoCo hasn't found the forces yet.
+def law_of_a_step(at: int) -> None:
+    """Apply Coulomb's law, by the memory at an address: velocities are known, and MuJoCo hasn't
+    found the forces yet.
 
     Rows ask for a step without slip and approach at its end (Moreau), and hold what was borne
     before; normal ones are shifted by the slip times mu (De Saxcé), for which MuJoCo's cone is
     Coulomb's. Slip is predicted from the last step's; where that is in doubt, it is solved for.
     """
-    model, data, memory = models(m, 1)[0], datas(d, 1)[0], memories(at, 1)[0]
-    memory.model, memory.data = m, d
+    memory = memories(at, 1)[0]
+    model, data = models(memory.model, 1)[0], datas(memory.data, 1)[0]
     rows.put_rows_back(data, memory)
     rigid.take_dampers_away(model, data, memory)
     if memory.law.kinetic < 1:
