@@ -11,9 +11,6 @@ from typing import Any
 
 from .compiling import kernel
 from .engine import (
-    BOX,
-    HEIGHTFIELD,
-    MESH,
     MJ_CONTACT,
     engine_contacts,
     integers,
@@ -64,15 +61,6 @@ def kinds(model: Any, geoms: Any) -> Any:
     types = integers(model.geom_type, model.ngeom)
     one, other = types[geoms[0]], types[geoms[1]]
     return min(one, other), max(one, other)
-
-
-@kernel
-def hops(model: Any, geoms: Any) -> bool:
-    """Whether a contact may be with one corner now, with another in the next step: of a flat body
-    on a cell of a heightfield the collider has one point. (Soft ones may have come deep meanwhile.)
-    """
-    least, most = kinds(model, geoms)
-    return bool(least == HEIGHTFIELD and BOX <= most <= MESH)
 
 
 @kernel
@@ -352,10 +340,10 @@ def pair_of(model: Any, contact: Any) -> int:
 
 @kernel
 def nearest(model: Any, memory: Any, old: Any) -> int:
-    """The contact of this step nearest to one before; -1 if none is of its geoms. An inner wall of
-    a heightfield mustn't inherit what its cells bear."""
+    """The contact of this step nearest to one before of these geoms; -1 if there is none. One whose
+    normal lies across isn't the same: inner walls of heightfields would inherit what cells bear."""
     contacts, pairs = contacts_of(memory), pairs_at(memory.pair_at, memory.contacts)
-    key, low, high, on_cells = pair_of(model, old), 0, len(pairs), hops(model, old.geoms)
+    key, low, high = pair_of(model, old), 0, len(pairs)
     while low < high:
         middle = (low + high) // 2
         if pairs[middle].geoms < key:
@@ -366,8 +354,7 @@ def nearest(model: Any, memory: Any, old: Any) -> int:
     while low < len(pairs) and pairs[low].geoms == key:
         contact = contacts[pairs[low].contact]
         square = square_apart(contact, old)
-        across = on_cells and cosine(contact.normal, old.normal) < ACROSS
-        if square < least and not across:
+        if square < least and cosine(contact.normal, old.normal) >= ACROSS:
             best, least = pairs[low].contact, square
         low += 1
     return int(best)
