@@ -16,6 +16,8 @@ from .contacts import cosine, leave_out, same_geoms, smaller_radius
 from .engine import HEIGHTFIELD, engine_contacts, integers, reals, singles
 from .memory import contacts_of
 from .parameters import ALIGNED, AT_MOST, EDGE, LEVEL
+from .patches import make_rows_anew, set_axes
+from .turning import applied, dot, plus, times_vector, vector_at
 
 
 @kernel
@@ -26,6 +28,7 @@ def leave_inner_edges_out(model: Any, data: Any, memory: Any) -> bool:
     """
     contacts, found = contacts_of(memory), engine_contacts(data.contact, data.ncon)
     on_floor, count, left_out = integers(memory.floor_at, memory.contacts), 0, False
+    turned = False
     for i in range(memory.contacts):
         contact = contacts[i]
         contact.piece = piece_of(model, contact)
@@ -44,7 +47,12 @@ def leave_inner_edges_out(model: Any, data: Any, memory: Any) -> bool:
         if others == needed:
             leave_out(data, found[edge.index])
             left_out = True
-    return left_out
+        elif hill:
+            turn_to_cells(model, data, edge, found[edge.index])
+            turned = True
+    if turned:
+        make_rows_anew(memory)
+    return left_out or turned
 
 
 @kernel
@@ -117,37 +125,58 @@ def height_above(model: Any, data: Any, piece: int, floor: Any, up: float) -> fl
 def is_steeper(model: Any, data: Any, edge: Any) -> bool:
     """Whether a contact with a heightfield leans farther to one side than all cells around; not at
     its border."""
-    piece, x, y = edge.geoms[edge.piece], 0.0, 0.0
-    place = reals(data.geom_xpos, (model.ngeom, 3))[piece]
-    axes = reals(data.geom_xmat, (model.ngeom, 3, 3))[piece]
-    along, across, up = 0.0, 0.0, 0.0  # its normal, in the axes of the heightfield
-    for j in range(3):
-        way, normal = edge.pos[j] - place[j], edge.frame[0, j]
-        x, y = x + axes[j, 0] * way, y + axes[j, 1] * way
-        along, across = along + axes[j, 0] * normal, across + axes[j, 1] * normal
-        up += axes[j, 2] * normal
-    if up < 0:
-        along, across, up = -along, -across, -up
-    level, field = max(up, LEVEL), integers(model.geom_dataid, model.ngeom)[piece]
-    slope_x, slope_y = nearest_slopes(model, field, x, y, -along / level, -across / level)
-    length = math.sqrt(1 + slope_x**2 + slope_y**2)
-    cosine_to_cells = (up - slope_x * along - slope_y * across) / length
-    return bool(cosine_to_cells < 1 - ALIGNED)
+    normal, _ = of_cells(model, data, edge)
+    return bool(abs(dot(normal, edge.frame[0])) < 1 - ALIGNED)
 
 
 @kernel
-def nearest_slopes(model: Any, field: int, x: float, y: float, along: float, across: float) -> Any:
+def turn_to_cells(model: Any, data: Any, edge: Any, given: Any) -> None:
+    """Turn a contact with an inner wall of a heightfield to the cells around it."""
+    normal, given.dist = of_cells(model, data, edge)
+    set_axes(given.frame, normal, axes_of(model, data, edge)[0])
+
+
+@kernel
+def axes_of(model: Any, data: Any, edge: Any) -> Any:
+    """The axes of what is at rest in a contact."""
+    turn = reals(data.geom_xmat, (model.ngeom, 9))[edge.geoms[edge.piece]]
+    return (turn[0], turn[3], turn[6]), (turn[1], turn[4], turn[7]), (turn[2], turn[5], turn[8])
+
+
+@kernel
+def of_cells(model: Any, data: Any, edge: Any) -> Any:
+    """The normal that cells around a contact with a heightfield have nearest to its own, and how
+    high the point of the other body is above them, m."""
+    piece, axes, own = (
+        edge.geoms[edge.piece],
+        axes_of(model, data, edge),
+        vector_at(edge.frame[0], 0),
+    )
+    place = vector_at(reals(data.geom_xpos, (model.ngeom, 3))[piece], 0)
+    point = plus(plus(edge.pos, edge.gap / 2, own), -1.0, place)
+    point, leans = applied(axes, point), applied(axes, own)
+    level, field = max(leans[2], LEVEL), integers(model.geom_dataid, model.ngeom)[piece]
+    slopes = -leans[0] / level, -leans[1] / level
+    along, across, height = nearest_cells(model, field, point, slopes)
+    length = math.sqrt(1 + along**2 + across**2)
+    normal = plus(plus(axes[2], -along, axes[0]), -across, axes[1])
+    return times_vector(1 / length, normal), (point[2] - height) / length
+
+
+@kernel
+def nearest_cells(model: Any, field: int, point: Any, slopes: Any) -> Any:
     """Of the slopes along and across that the four cells of a heightfield about its point next to
-    x, y have, those nearest to given ones; these themselves at its border."""
+    another one have, those nearest to given ones, and the height there; these themselves at its
+    border."""
     rows = integers(model.hfield_nrow, model.nhfield)[field]
     columns = integers(model.hfield_ncol, model.nhfield)[field]
     size = reals(model.hfield_size, (model.nhfield, 4))[field]
     first = integers(model.hfield_adr, model.nhfield)[field]
     heights = singles(model.hfield_data + 4 * first, (rows, columns))
     wide, long = 2 * size[0] / (columns - 1), 2 * size[1] / (rows - 1)
-    row, column = round((y + size[1]) / long), round((x + size[0]) / wide)
+    column, row = round((point[0] + size[0]) / wide), round((point[1] + size[1]) / long)
     if not (0 < row < rows - 1 and 0 < column < columns - 1):
-        return along, across
+        return slopes[0], slopes[1], 0.0
     least_along, most_along, least_across, most_across = math.inf, -math.inf, math.inf, -math.inf
     for i in range(-1, 2):
         for k in range(2):
@@ -157,5 +186,7 @@ def nearest_slopes(model: Any, field: int, x: float, y: float, along: float, acr
             here, there = heights[row + k, column + i], heights[row + k - 1, column + i]
             slope = size[2] * (here - there) / long
             least_across, most_across = min(least_across, slope), max(most_across, slope)
-    along = min(max(along, least_along), most_along)
-    return along, min(max(across, least_across), most_across)
+    along = min(max(slopes[0], least_along), most_along)
+    across = min(max(slopes[1], least_across), most_across)
+    height = size[2] * heights[row, column] + along * (point[0] + size[0] - wide * column)
+    return along, across, height + across * (point[1] + size[1] - long * row)

@@ -215,12 +215,18 @@ def add_point(data: Any, memory: Any, old: Any) -> None:
     """Add a lost point to mjData, else as the last of its pair of geoms there is."""
     copy(data.contact + SIZE * old.index, memory.point_at, WORDS)
     point = engine_contacts(memory.point_at, 1)[0]
-    normal, along = vector_at(old.frame[0], 0), vector_at(point.frame, 3)
-    along = plus(along, -dot(along, normal), normal)
-    along = times_vector(1 / math.sqrt(dot(along, along)), along)
-    across = cross(normal, along)
+    set_axes(point.frame, vector_at(old.frame[0], 0), vector_at(point.frame, 3))
     point.dist = old.gap
     for j in range(3):
         point.pos[j] = old.pos[j]
-        point.frame[j], point.frame[3 + j], point.frame[6 + j] = normal[j], along[j], across[j]
     mj_addContact(memory.model, memory.data, memory.point_at)
+
+
+@kernel
+def set_axes(frame: Any, normal: Any, along: Any) -> None:
+    """Give a contact of mjData a normal, and tangents of which the first is near to `along`."""
+    along = plus(along, -dot(along, normal), normal)
+    along = times_vector(1 / math.sqrt(dot(along, along)), along)
+    across = cross(normal, along)
+    for j in range(3):
+        frame[j], frame[3 + j], frame[6 + j] = normal[j], along[j], across[j]

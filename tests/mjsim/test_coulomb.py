@@ -277,6 +277,23 @@ def test_what_slides_over_the_corner_of_a_cell_keeps_its_corners():
     assert ahead @ data.qpos[:2] - 0.013 == pytest.approx(way, rel=0.01)
 
 
+@pytest.mark.parametrize("shape", ['type="box" size=".1 .1 .05"', 'type="cylinder" size=".1 .05"'])
+def test_what_slides_over_cells_larger_than_itself_is_stopped_by_no_inner_wall(shape):
+    """Where the collider had but one point beside that of the wall, it was, in one of ten
+    directions: a third of its way was missing."""
+    asset = '<asset><hfield name="hill" nrow="7" ncol="7" size="1.5 1.5 1 1"/></asset>'
+    bodies = '<geom type="hfield" hfield="hill"/>' + free("body", "0 0 .55", shape)
+    speed, start, ways = 2.0, np.array([0.03, 0.02]), []
+    for angle in np.radians(range(0, 360, 12)):
+        made, data = world(bodies, more=asset, mu=0.5)
+        made.hfield_data[:] = 0.5
+        data.qpos[:2], data.qvel[:2] = start, speed * np.array([np.cos(angle), np.sin(angle)])
+        data.qpos[3], data.qpos[6] = np.cos(angle / 2 + 0.1), np.sin(angle / 2 + 0.1)
+        Coulomb(made, rigid=True).step(data, 750)
+        ways.append(np.hypot(*data.qpos[:2] - start))
+    assert np.array(ways) == pytest.approx(speed**2 / (2 * 0.5 * G), rel=0.01)
+
+
 def test_a_wheel_rolls_over_cells_of_a_heightfield_as_over_a_plane():
     """It bore on points some mm below it, to which the collider jumped, and lost 4 % of its way."""
     hill = '<hfield name="hill" nrow="21" ncol="21" size="4 4 .1 .1"/>'
