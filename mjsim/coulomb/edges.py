@@ -1,5 +1,5 @@
 """Inner edges of floors in pieces, and of heightfields: at these what slides from one piece to the
-next, or one cell, would stop. Contacts with them are left out.
+next, or one cell, would stop. Contacts with them are left out, or turned to the cells around.
 
 A convex geom lies above all of a contact that it has. What reaches no higher than this contact, the
 geom can't run against: a contact with it that has another normal is one of an inner edge. A
@@ -17,18 +17,19 @@ from .engine import HEIGHTFIELD, engine_contacts, integers, reals, singles
 from .memory import contacts_of
 from .parameters import ALIGNED, AT_MOST, EDGE, LEVEL
 from .patches import make_rows_anew, set_axes
-from .turning import applied, dot, plus, times_vector, vector_at
+from .vectors import applied, dot, plus, times_vector
 
 
 @kernel
 def leave_inner_edges_out(model: Any, data: Any, memory: Any) -> bool:
-    """Leave out contacts with inner edges of what is at rest.
+    """Leave out contacts with inner edges of what is at rest; those with a heightfield are turned
+    to its cells if they are needed: on one point alone what isn't round would fall over.
 
     Returns whether there were any.
     """
     contacts, found = contacts_of(memory), engine_contacts(data.contact, data.ncon)
-    on_floor, count, left_out = integers(memory.floor_at, memory.contacts), 0, False
-    turned = False
+    on_floor, count = integers(memory.floor_at, memory.contacts), 0
+    left_out = turned = False
     for i in range(memory.contacts):
         contact = contacts[i]
         contact.piece = piece_of(model, contact)
@@ -39,7 +40,6 @@ def leave_inner_edges_out(model: Any, data: Any, memory: Any) -> bool:
         edge, hill = contacts[i], on_hill(model, contacts[i])
         if not (edge.steeper if hill else closes(model, data, memory, edge)):
             continue
-        # on one point of a hill alone what isn't round would fall over
         needed, others = 2 if hill else 1, 0
         for k in on_floor[:count]:
             if others < needed and not found[contacts[k].index].exclude:
@@ -147,12 +147,8 @@ def axes_of(model: Any, data: Any, edge: Any) -> Any:
 def of_cells(model: Any, data: Any, edge: Any) -> Any:
     """The normal that cells around a contact with a heightfield have nearest to its own, and how
     high the point of the other body is above them, m."""
-    piece, axes, own = (
-        edge.geoms[edge.piece],
-        axes_of(model, data, edge),
-        vector_at(edge.frame[0], 0),
-    )
-    place = vector_at(reals(data.geom_xpos, (model.ngeom, 3))[piece], 0)
+    piece, axes = edge.geoms[edge.piece], axes_of(model, data, edge)
+    place, own = reals(data.geom_xpos, (model.ngeom, 3))[piece], edge.frame[0]
     point = plus(plus(edge.pos, edge.gap / 2, own), -1.0, place)
     point, leans = applied(axes, point), applied(axes, own)
     level, field = max(leans[2], LEVEL), integers(model.geom_dataid, model.ngeom)[piece]
@@ -177,16 +173,20 @@ def nearest_cells(model: Any, field: int, point: Any, slopes: Any) -> Any:
     column, row = round((point[0] + size[0]) / wide), round((point[1] + size[1]) / long)
     if not (0 < row < rows - 1 and 0 < column < columns - 1):
         return slopes[0], slopes[1], 0.0
-    least_along, most_along, least_across, most_across = math.inf, -math.inf, math.inf, -math.inf
-    for i in range(-1, 2):
-        for k in range(2):
-            here, there = heights[row + i, column + k], heights[row + i, column + k - 1]
-            slope = size[2] * (here - there) / wide
-            least_along, most_along = min(least_along, slope), max(most_along, slope)
-            here, there = heights[row + k, column + i], heights[row + k - 1, column + i]
-            slope = size[2] * (here - there) / long
-            least_across, most_across = min(least_across, slope), max(most_across, slope)
-    along = min(max(slopes[0], least_along), most_along)
-    across = min(max(slopes[1], least_across), most_across)
+    about = heights[row - 1 : row + 2, column - 1 : column + 2]
+    along = nearest_slope(about, size[2] / wide, slopes[0])
+    across = nearest_slope(about.T, size[2] / long, slopes[1])
     height = size[2] * heights[row, column] + along * (point[0] + size[0] - wide * column)
     return along, across, height + across * (point[1] + size[1] - long * row)
+
+
+@kernel
+def nearest_slope(heights: Any, scale: float, slope: float) -> float:
+    """Of the slopes along rows of heights, which differences are times `scale`, that nearest to a
+    given one; they have all between the least and the most."""
+    least, most = math.inf, -math.inf
+    for i in range(len(heights)):
+        for k in range(len(heights) - 1):
+            own = scale * (heights[i, k + 1] - heights[i, k])
+            least, most = min(least, own), max(most, own)
+    return float(min(max(slope, least), most))

@@ -59,7 +59,7 @@ def put_points_back(model: Any, data: Any, memory: Any) -> bool:
             continue
         place_lost_point(model, data, old)
         overlaps = old.gap < 0 and old.moved < (least / 10) ** 2
-        if overlaps and is_lost(data, memory, old, near):
+        if overlaps and is_lost(data, old, near):
             add_point(data, memory, old)
             added += 1
     if added:
@@ -176,18 +176,14 @@ def place_lost_point(model: Any, data: Any, old: Any) -> None:
 
 
 @kernel
-def is_lost(data: Any, memory: Any, old: Any, near: float) -> bool:
-    """Whether the collider has no more closed points of these two faces than before, and none near
-    this one: of the corners of a polygon, and of a heightfield, it takes some by turns."""
-    before = contacts_at(memory.before_at, memory.contacts_before)
-    found = engine_contacts(data.contact, data.ncon)
-    had, left = 0, 0
-    for i in range(len(before)):
-        had += is_of_face(before[i].geoms, before[i].frame[0], old)
+def is_lost(data: Any, old: Any, near: float) -> bool:
+    """Whether the collider has closed points of these two faces, but none near this one: of the
+    corners of a polygon, and of a heightfield, it takes some by turns."""
+    found, closed = engine_contacts(data.contact, data.ncon), False
     for i in range(data.ncon):
         if is_of_face(found[i].geom, found[i].frame, old):
-            left, old.index = left + (found[i].dist <= 0), i
-    return bool(0 < left <= had and not has_near(data, old, near))
+            closed, old.index = closed or found[i].dist <= 0, i
+    return bool(closed and not has_near(data, old, near))
 
 
 @kernel
