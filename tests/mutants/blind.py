@@ -10,7 +10,7 @@ import json
 import math
 import pkgutil
 import sys
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -20,6 +20,8 @@ from typing import Any
 import numpy as np
 
 import analytic
+from analytic.mechanics.drag import coefficient
+from analytic.simulation import compiling
 from compare import validation
 from compare.campaign.campaign import Campaign
 from compare.campaign.progress import ValidationProgress, show_nothing
@@ -37,8 +39,10 @@ from compare.verification.claim import EngineVerdict, Outcome, Verdict
 from compare.verification.judge import forget
 from docs.studies import tables
 from model import Parameters
+from model.drag import LAWS, STOKES
 from model.files import make_directory, write_text
 from model.versions import current_commit
+from tests.by_scipy import runs_by_scipy
 from tests.mutants import formulas
 from tests.mutants.engines import wrong_engine
 from tests.mutants.exchange import WrongTheory, believed
@@ -50,16 +54,27 @@ ASKED = ("drake", "siconos")
 UNCHANGED = 1e-9
 """Part of its natural size by which a prediction may move for a fault to have changed nothing: a
 fault in the first guess of an iteration leaves round-off. (It was a part of the prediction, until
-two such faults of seed 20261217 had counted as missed: a prediction of 0 had moved by 1e-16.)"""
+two such faults of seed 20261217 had counted as missed: a prediction of 0 had moved by 1e-16. Up to
+seed 20261215 motions by a wrong theory, which scipy's integrators find, were compared with those by
+the right one's compiled ones: these differ by up to 5e-8.)"""
 BY = (MUJOCO, PLAIN)
+REYNOLDS_NUMBERS = (200.0, 2000.0)
+"""Of a ball that moves with sqrt(g R) through the fluid."""
 
 
 def drawn(rng: np.random.Generator) -> Parameters:
-    """A set drawn evenly from the box of the study's design."""
+    """A set drawn evenly from the box of the study's design, with one of the laws of drag.
+
+    That has the coefficient of the design at a speed of sqrt(g R) in the fluid, where the Reynolds
+    number is that of two sets of the study, or up to ten times as great."""
     values: dict[str, Any] = {name: float(rng.uniform(LOW[name], HIGH[name])) for name in LOW}
     ratio, kappa = values.pop("r/R"), values.pop("kappa")
-    c = kappa * math.sqrt(values["g"] / values["R"])
-    return Parameters(**values, r=ratio * values["R"], c=c, omega_0=1.0)
+    least, most = REYNOLDS_NUMBERS
+    drag, Re = str(rng.choice(LAWS)), least * (most / least) ** rng.uniform()
+    r, speed = ratio * values["R"], math.sqrt(values["g"] * values["R"])
+    nu_f = 0.0 if drag == STOKES else 2 * r * speed / Re
+    p = Parameters(**values, r=r, c=1.0, omega_0=1.0, drag=drag, nu_f=nu_f)
+    return p.replace(c=kappa * math.sqrt(p.g / p.R) / float(coefficient(speed, p)))
 
 
 def measured(
@@ -125,10 +140,11 @@ class Detection:
     broke: bool = False
     """Whether some prediction broke down, or was given up: that alone finds nothing."""
 
-    def add(self, said: Said, now: Verdict) -> None:
-        """Take in a verdict under the fault."""
+    def add(self, right: Verdict, now: Verdict) -> None:
+        """Take in a verdict under the fault, beside that by the right theory."""
+        engines = {each.engine: each for each in right.engines}
         for each in now.engines:
-            before = said.engines[each.engine]
+            before = engines[each.engine]
             one, other = ([check.predicted for check in of.checks] for of in (before, each))
             sizes = [check.scale for check in before.checks]
             self.broke |= each.outcome is Outcome.ERROR
@@ -140,10 +156,26 @@ class Detection:
                 self.by.setdefault(each.engine, now.claim.id)
 
 
-def tried(wrong: WrongTheory, said: Sequence[Said], records: RecordsByEngine) -> Detection:
+def rightly_by_scipy(said: Sequence[Said], records: RecordsByEngine) -> dict[str, Verdict]:
+    """Verdicts by the right theory on claims of which formulas are compiled, by their ids, with
+    the integrators by which wrong ones run."""
+    compiled = {each.__code__ for each in compiling.called}
+    claims = [each.verdict.claim for each in said if each.calls & compiled]
+    forget()
+    with runs_by_scipy():
+        return {claim.id: full_verdict(claim, records) for claim in claims}
+
+
+def tried(
+    wrong: WrongTheory,
+    said: Sequence[Said],
+    by_scipy: Mapping[str, Verdict],
+    records: RecordsByEngine,
+) -> Detection:
     """Judge the claims that call a wrong function, until every engine has found the fault."""
     detection = Detection()
-    code = getattr(importlib.import_module(wrong.module), wrong.function).__code__
+    function = getattr(importlib.import_module(wrong.module), wrong.function)
+    code, rights = function.__code__, by_scipy if function in compiling.called else {}
     forget()
     with believed(wrong):
         for each in (each for each in said if code in each.calls):
@@ -151,7 +183,8 @@ def tried(wrong: WrongTheory, said: Sequence[Said], records: RecordsByEngine) ->
                 continue
             try:
                 with at_most(LONGEST):
-                    detection.add(each, full_verdict(each.verdict.claim, records))
+                    right = rights.get(each.verdict.claim.id, each.verdict)
+                    detection.add(right, full_verdict(each.verdict.claim, records))
             except LateError:
                 detection.broke = detection.changes = True
     return detection
@@ -165,7 +198,7 @@ def tried_engine(wrong: Engine, said: Sequence[Said], directory: Path, p: Parame
     own = {MUJOCO.name: records[wrong.name]}
     forget()
     for each in (each for each in said if each.verdict.claim.protocols <= PROVING):
-        detection.add(each, full_verdict(each.verdict.claim, own))
+        detection.add(each.verdict, full_verdict(each.verdict.claim, own))
     return detection
 
 
@@ -196,7 +229,8 @@ def play(
     balls = [formulas.of_ball(rng) for _ in range(engines)]
     key = [*(each.what for each in wrongs), *(what for what, _ in balls)]
     write_text(directory / KEY, json.dumps(key, ensure_ascii=False, indent=1))
-    detections = [tried(wrong, said, records) for wrong in wrongs]
+    by_scipy = rightly_by_scipy(said, records)
+    detections = [tried(wrong, said, by_scipy, records) for wrong in wrongs]
     for n, (_, ball) in enumerate(balls):
         wrong = wrong_engine(f"blind-engine-{n}", ball)
         detections.append(tried_engine(wrong, said, directory / wrong.name, p))
@@ -225,14 +259,15 @@ def section(
         found.append([shown, *(each.by.get(name, "–") for name in names), ", ".join(notes)])
     absent = ", ".join(name for name in ASKED if name not in names)
     live = sum(each.changes for _, each in faults)
-    values = (f"{n} = {getattr(p, n):.4g}" for n in ("mu", "eta", "j", "r", "R", "m", "g", "c"))
+    names_of = ("mu", "eta", "j", "r", "R", "m", "g", "c", *["nu_f"] * (p.drag != STOKES))
+    values = ", ".join(f"{name} = {getattr(p, name):.4g}" for name in names_of)
     return f"""
 ## Seed {seed}
 
 Found: **{sum(bool(each.by) for _, each in faults)} of the {live} faults that change a prediction \
 or a measurement**, of {len(faults)}
 that were planted. Rules as
-of the commit `{current_commit()[:12] or "unknown"}`. Set, SI: `{", ".join(values)}`.
+of the commit `{current_commit()[:12] or "unknown"}`. Set, SI: `{values}`, drag: {p.drag}.
 Measured by {", ".join(names)}; not installed: {absent or "none"}.
 
 {pages.markdown(counts)}
