@@ -333,8 +333,9 @@ def _turn(fan: Sequence[Push]) -> Procedure[None]:
     yield first.runner.measurement(first.start.set, first.start.p, "steepest", beta, own, **at)
 
 
-# the second two flows, divided by the zero that the first two show
-AROUND, AROUND_BENT = (0.7, 1.3), (0.8, 1.1)  # the latter where the law of drag bends the line
+AROUND, AROUND_BENT = ((0.7, 1.3),), ((0.8, 1.1), (0.9, 1.05), (0.95, 1.15))
+"""Pairs of flows, one after the other, divided by the zero that the pair before shows; the latter
+where the law of drag bends the line."""
 MOST_BEYOND = 2.1
 """Largest zero recorded, divided by the largest value at which slip stayed in its case."""
 MOST_FOLLOWED = 100.0  # largest zero followed, divided by the largest of the first flows
@@ -373,20 +374,24 @@ def _cross(pushes: Sequence[Push], more: Sequence[Push] = ()) -> Procedure[None]
     """Zero and slope of gamma along a line of states, from pushes at two flows, and from `more`, or
     where the first two show the zero.
 
-    gamma is a line in omega_0, or in its square where the orbit goes with it; another law of drag
-    than Stokes' makes it a cubic."""
+    gamma is a line in omega_0, or in its square where the orbit goes with it. Another law of drag
+    than Stokes' bends it: then those first flows are far from the zero, and four near it count."""
     push = pushes[0]
     power = 1 if push.start.name == "held" else 2
     curved = power == 1 and push.start.p.drag != STOKES
     seen = yield from _growths(pushes)
-    if any(math.isnan(gamma.value) for gamma in seen.gammas):
+    if not seen.complete:
         yield from seen.strays or [push.missing(STRAYS, 2)]
         return
-    near = AROUND_BENT if curved else AROUND
+    tasks, (near, *nearer) = seen.tasks, AROUND_BENT if curved else AROUND
     later = yield from _growths(more or _around(seen, push, power, near))
+    for near in nearer:
+        if later.complete:
+            tasks, seen = tasks + later.tasks, later
+            later = yield from _growths(_around(seen, push, power, near))
     known = zip(seen.flows + later.flows, seen.gammas + later.gammas, strict=True)
     flows, gammas = zip(*((flow, g) for flow, g in known if not math.isnan(g.value)), strict=True)
-    q, tasks = np.array(flows) ** power, seen.tasks + later.tasks
+    q, tasks = np.array(flows) ** power, tasks + later.tasks
     # What the step changes may be little by chance at one of the flows. Points of a line share
     # causes of error: more of them don't reduce the uncertainty.
     least = max(gamma.uncertainty for gamma in seen.gammas)
@@ -410,10 +415,11 @@ def _around(seen: Growths, first: Push, power: int, near: Sequence[float]) -> li
     zero = float(q[0] - low / slope) if slope else math.inf
     if not 0 < zero < (MOST_FOLLOWED * max(seen.flows)) ** power:
         return []
-    least, pushes = seen.flows[0] if power == 1 else 0.0, []
+    held, pushes = State.of(first.start.x0).omega_c, []
     for factor in near:
+        least = held if power == 1 else 0.0
         omega_0 = float(least + (zero ** (1 / power) - least) * factor)
-        orbit = State.of(first.start.x0).omega_c if power == 1 else omega_0
+        orbit = held if power == 1 else omega_0
         p, x0 = first.start.p.replace(omega_0=omega_0), State(omega_c=orbit).stacked()
         pushes.append(replace(first, start=replace(first.start, p=p, x0=x0)))
     return pushes
@@ -428,6 +434,11 @@ class Growths:
     tasks: list[Task] = field(default_factory=list)
     # what became of slips that didn't last, and of runs that broke down
     strays: list[Measurement | Missing] = field(default_factory=list)
+
+    @property
+    def complete(self) -> bool:
+        """Whether there are any, and each slip lasted."""
+        return bool(self.gammas) and not any(math.isnan(gamma.value) for gamma in self.gammas)
 
 
 def _growths(pushes: Sequence[Push]) -> Procedure[Growths]:
