@@ -649,6 +649,19 @@ def test_an_end_that_cannot_be_extrapolated_is_missing_and_no_finding(runner, mo
     assert [*records.select("thresholds", "folds")] == []
 
 
+def test_a_ball_that_lags_is_not_taken_for_one_that_rolls_with_the_fluid(runner):
+    """Pressed to the floor, it does so for as long as anyone waits where drag is quadratic, and
+    rolls on in flows that are faster than it by that."""
+    p = QUICK["blunt"].replace(eta=0.87)
+    runner, known_before = replace(runner, protocol="thresholds"), known("d", p, "omega_03")
+    found = Records.of(thresholds.measure(runner, {"d": p}, known_before))
+    (pressed,) = found.select("thresholds", "omega_03", lambda m: m.at["side"] == "from above")
+    tolerance = COVERAGE * pressed.uncertainty
+    assert pressed.value == pytest.approx(analytic.thresholds(p).omega_03, abs=tolerance)
+    assert tolerance < QUANTITIES["omega_03"].resolution * pressed.value
+    assert pressed.budget["behind_fluid"] > 1e-6 * pressed.value
+
+
 def run_of(time, y, theta):
     return motion(HOPPING, time, y=y, theta=theta, omega_c=np.gradient(theta, time))
 

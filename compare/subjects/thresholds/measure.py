@@ -40,6 +40,7 @@ from compare.method.statistics import (
     extrapolated_zero,
     settled_case,
     tail,
+    uniform,
 )
 from compare.method.together import Procedure, narrowed, settled, together
 from model import Case, Contact, Parameters, State, Trajectory
@@ -218,7 +219,10 @@ def _sinking_and_slipping(each: Findings) -> Procedure[None]:
 
 def _on_the_wall_and_back(each: Findings) -> Procedure[None]:
     """Where slip begins on the wall, and where a ball that is pressed on the floor, with a bit less
-    spin, rolls again: from settled states continued."""
+    spin, rolls again: from settled states continued.
+
+    It rolls more slowly then than the fluid, in proportion to that bit, which therefore is no more
+    than the bracket's width: drag that goes with the square of the lag doesn't make up for it."""
     searches, width = [], each.runner.sampling.thresholds_width
     begins, carried = each.brackets.get(NS_ENDS), each.states.get("NR", [])
     if begins and len(carried) == len(DISTANCES_OF_NR):
@@ -227,7 +231,7 @@ def _on_the_wall_and_back(each: Findings) -> Procedure[None]:
     end, lifted = each.brackets.get(RR_ENDS), each.states.get("lifted", [])
     if end and len(lifted) == len(DISTANCES_OF_NR):
         change = Bracket(end.low * (1 - COARSE), end.high * (1 + COARSE))
-        pressed = continued(lifted, height=0.0, less=1e-3)
+        pressed = continued(lifted, height=0.0, less=width)
         searches.append(each.search(RR_RETURNS, change, width * end.high, pressed))
     yield from each.narrow(each.sure, *searches)
 
@@ -318,13 +322,16 @@ class Findings:
     ) -> Measurement | Missing:
         """The measurement of a threshold that lies in a bracket."""
         # Slip that is still too small to count may have begun below: it is proportional to the
-        # distance.
-        _, above = of.runs
+        # distance. A ball that lags behind the fluid still rolls where one as fast as that may not.
+        below, above = of.runs
         speed = max(slip(speeds, above) for speeds in sliding_speeds(above)) if above else 0.0
-        unseen = 0.0
+        unseen = lag = 0.0
         if quantity in ("omega_01", "omega_02"):
             unseen = max(of.width / max(1.0, speed), SLIP_SEEN * of.high)
-        return self.row(quantity, of.place.also(unseen_slip=unseen), of.tasks, side=side, by=by)
+        if below and quantity in ("omega_01", "omega_03"):
+            lag = uniform(abs(float(below.omega_0[-1] - below.omega_c[-1])))
+        place = of.place.also(unseen_slip=unseen, behind_fluid=lag)
+        return self.row(quantity, place, of.tasks, side=side, by=by)
 
     def rows_of_zero(self, which: str, what: str, quantity: str, side: str, by: str) -> Measured:
         """The measurement of a threshold, extrapolated from settled states to a zero."""
