@@ -179,14 +179,15 @@ class Callback:
             If a law of the other kind, soft or rigid, acts on the model just now.
         """
         with self._lock:
+            option = model.opt
             users, as_rigid, options = self._users.get(model._address) or (0, rigid, {})
             if as_rigid != rigid:
                 kinds = "rigid and soft Coulombs need different options"
                 raise ValueError(f"{kinds}: one at a time for a model")
             if not users:
                 for name, value in wanted().items():
-                    options[name] = getattr(model.opt, name)
-                    setattr(model.opt, name, value)
+                    options[name] = getattr(option, name)
+                    setattr(option, name, value)
             self._users[model._address] = users + 1, rigid, options
             before = _SLOT.value
             if before != _served():
@@ -202,8 +203,9 @@ class Callback:
             if users > 1:
                 self._users[model._address] = users - 1, rigid, options
             else:
+                option = model.opt
                 for name, value in options.items():
-                    setattr(model.opt, name, value)
+                    setattr(option, name, value)
             if not self._users and _SLOT.value == _served():
                 _SLOT.value = self._before
 
