@@ -10,15 +10,9 @@ import math
 from typing import Any
 
 from .compiling import kernel
-from .engine import (
-    MJ_CONTACT,
-    engine_contacts,
-    integers,
-    mj_isSparse,
-    reals,
-    words,
-)
+from .engine import engine_contacts, integers, mj_isSparse, reals, words
 from .memory import (
+    CONTACT,
     CONTACT_ROW,
     DRY,
     EQUALITY,
@@ -31,42 +25,55 @@ from .memory import (
     contacts_at,
     contacts_of,
     dry_of,
+    dry_rows_of,
     make_room,
     pairs_at,
     rows_of,
+    rows_of_contact,
 )
 from .parameters import ACROSS, ALIKE, APART, FARTHEST, FLUSH, STILL, UNMOVED
+from .vectors import applied, assign, dot, plus, square_between, vector_at
 
-SIZE = MJ_CONTACT.itemsize
-WORDS = SIZE // 8
+WORDS = CONTACT.itemsize // 8
+
+
+@kernel
+def radii(model: Any, geoms: Any) -> Any:
+    """The radii of two geoms, m; planes have none."""
+    radius = reals(model.geom_rbound, model.ngeom)
+    return radius[geoms[0]], radius[geoms[1]]
 
 
 @kernel
 def smaller_radius(model: Any, geoms: Any) -> float:
-    """The smaller radius of two geoms, m; planes have none."""
-    radius = reals(model.geom_rbound, model.ngeom)
-    one, other = radius[geoms[0]], radius[geoms[1]]
-    return float(min(one, other) or max(one, other))
+    """The smaller radius of two geoms, m, of which one may be a plane."""
+    both = radii(model, geoms)
+    return float(min(both) or max(both))
+
+
+@kernel
+def place_of(model: Any, data: Any, geom: int) -> Any:
+    """Where a geom is, m."""
+    return vector_at(reals(data.geom_xpos, 3 * model.ngeom), 3 * geom)
+
+
+@kernel
+def axes_of(model: Any, data: Any, geom: int) -> Any:
+    """The axes of a geom."""
+    turn = reals(data.geom_xmat, (model.ngeom, 9))[geom]
+    return (turn[0], turn[3], turn[6]), (turn[1], turn[4], turn[7]), (turn[2], turn[5], turn[8])
+
+
+@kernel
+def in_world(model: Any, data: Any, geom: int, vector: Any) -> Any:
+    """A vector that is in the axes of a geom, in those of the world."""
+    return applied(reals(data.geom_xmat, (model.ngeom, 3, 3))[geom], vector)
 
 
 @kernel
 def same_geoms(one: Any, other: Any) -> bool:
     """Whether two contacts are of the same geoms."""
     return bool(one[0] == other[0] and one[1] == other[1])
-
-
-@kernel
-def kinds(model: Any, geoms: Any) -> Any:
-    """The kinds of two geoms, in MuJoCo's order."""
-    types = integers(model.geom_type, model.ngeom)
-    one, other = types[geoms[0]], types[geoms[1]]
-    return min(one, other), max(one, other)
-
-
-@kernel
-def cosine(one: Any, other: Any) -> float:
-    """The cosine of the angle between two normals."""
-    return float(one[0] * other[0] + one[1] * other[1] + one[2] * other[2])
 
 
 @kernel
@@ -80,27 +87,20 @@ def leave_out(data: Any, given: Any) -> None:
 
 
 @kernel
-def copy(source: int, target: int, count: int) -> None:
-    """Copy so many words of eight bytes from one address to another."""
-    given, kept = words(source, count), words(target, count)
-    for n in range(count):
-        kept[n] = given[n]
-
-
-@kernel
 def store_poses(model: Any, data: Any, memory: Any) -> None:
     """Store where bodies and contacts are, on which axes and Jacobians depend."""
-    copy(data.xpos, memory.xpos_at, 3 * model.nbody)
-    copy(data.xmat, memory.xmat_at, 9 * model.nbody)
-    copy(data.contact, memory.pose_at, data.ncon * WORDS)
+    places, axes = 3 * model.nbody, 9 * model.nbody
+    assign(reals(memory.xpos_at, places), reals(data.xpos, places))
+    assign(reals(memory.xmat_at, axes), reals(data.xmat, axes))
+    assign(engine_contacts(memory.pose_at, data.ncon), engine_contacts(data.contact, data.ncon))
 
 
 @kernel
-def stayed(one: Any, other: Any) -> bool:
-    """Whether numbers are what they were."""
+def stayed(one: Any, other: Any, most: float) -> bool:
+    """Whether numbers are what they were, but for so much at most."""
     still = True
     for i in range(len(one)):
-        still = still and abs(one[i] - other[i]) < STILL
+        still &= abs(one[i] - other[i]) <= most
     return still
 
 
@@ -110,34 +110,35 @@ def nothing_moved(model: Any, data: Any, memory: Any) -> bool:
     if memory.ncon != data.ncon or memory.rows != data.nefc or memory.dry != data.nf:
         return False
     places, axes = 3 * model.nbody, 9 * model.nbody
-    if not stayed(reals(data.xpos, places), reals(memory.xpos_at, places)):
-        return False
-    if not stayed(reals(data.xmat, axes), reals(memory.xmat_at, axes)):
-        return False
+    still = stayed(reals(data.xpos, places), reals(memory.xpos_at, places), STILL)
+    still = still and stayed(reals(data.xmat, axes), reals(memory.xmat_at, axes), STILL)
     found = engine_contacts(data.contact, data.ncon)
     poses = engine_contacts(memory.pose_at, data.ncon)
     for i in range(data.ncon):
-        contact, pose = found[i], poses[i]
-        if not same_geoms(contact.geom, pose.geom) or pose.dim != contact.dim:
-            return False
-        if pose.efc_address != contact.efc_address or not stayed(contact.frame, pose.frame):
-            return False
-        near = FLUSH * smaller_radius(model, contact.geom)
-        for j in range(3):
-            if not abs(contact.pos[j] - pose.pos[j]) <= near:
-                return False
-            if not abs(contact.friction[j] - pose.friction[j]) < STILL:
-                return False
-    return True
+        still = still and is_where_it_was(model, found[i], poses[i])
+    return bool(still)
+
+
+@kernel
+def is_where_it_was(model: Any, contact: Any, pose: Any) -> bool:
+    """Whether a contact of mjData is what it was when its pose was stored, but for its gap."""
+    return bool(
+        same_geoms(contact.geom, pose.geom)
+        and contact.dim == pose.dim
+        and contact.efc_address == pose.efc_address
+        and stayed(contact.frame, pose.frame, STILL)
+        and stayed(contact.friction, pose.friction, STILL)
+        and stayed(contact.pos, pose.pos, FLUSH * smaller_radius(model, contact.geom))
+    )
 
 
 @kernel
 def read_gaps(data: Any, memory: Any) -> None:
     """Read the gaps of contacts that haven't moved otherwise; those left out still are."""
-    contacts, found = contacts_of(memory), engine_contacts(data.contact, data.ncon)
-    for i in range(memory.contacts):
-        given = found[contacts[i].index]
-        contacts[i].gap, contacts[i].margin = given.dist, given.includemargin
+    found = engine_contacts(data.contact, data.ncon)
+    for contact in contacts_of(memory):
+        given = found[contact.index]
+        contact.gap, contact.margin = given.dist, given.includemargin
     poses = engine_contacts(memory.pose_at, data.ncon)
     for i in range(data.ncon):
         if poses[i].exclude and found[i].efc_address >= 0:
@@ -148,11 +149,9 @@ def read_gaps(data: Any, memory: Any) -> None:
 
 
 @kernel
-def find(model: Any, data: Any, memory: Any) -> None:
-    """Find the contacts of a step, their places on both bodies, and their constraint rows.
-
-    Those of flexes, and soft ones without friction or damping, are MuJoCo's own.
-    """
+def find(model: Any, data: Any, memory: Any) -> float:
+    """Find the contacts of a step, and let them inherit from those before; how far one has moved on
+    its bodies at most, m."""
     nonzeros = jacobian_length(model, data, memory)
     if (
         data.ncon > memory.room_contacts
@@ -161,72 +160,68 @@ def find(model: Any, data: Any, memory: Any) -> None:
     ):
         make_room(memory.address, data.ncon, data.nefc, nonzeros)
     store_poses(model, data, memory)
+    memory.rows, memory.ncon = data.nefc, data.ncon
+    memory.first_dry, memory.dry = data.ne, data.nf
+    read_contacts(model, data, memory)
+    sort_pairs(model, memory)
+    return float(match(model, data, memory))
+
+
+@kernel
+def read_contacts(model: Any, data: Any, memory: Any) -> None:
+    """Read the contacts of mjData, of which nothing else is known.
+
+    Those of flexes, and soft ones without friction or damping, are MuJoCo's own.
+    """
     found = engine_contacts(data.contact, data.ncon)
     contacts = contacts_at(memory.contact_at, data.ncon)
     damping = reals(data.efc_KBIP, (data.nefc, 4))
-    count = 0
+    clear(words(memory.contact_at, data.ncon * WORDS))
+    memory.contacts = 0
     for i in range(data.ncon):
         given, address = found[i], found[i].efc_address
         if address < 0 or given.exclude or given.geom[0] < 0 or given.geom[1] < 0:
             continue
         if not memory.law.rigid and (given.dim == 1 or damping[address + 1, 1] <= 0):
             continue
-        contact = contacts[count]
-        clear(contact)
+        contact = contacts[memory.contacts]
         contact.index, contact.address, contact.dim = i, address, given.dim
         contact.margin, contact.cone = given.includemargin, given.mu
         contact.velocity[0] = math.inf
-        for j in range(5):
-            contact.mu[j] = given.friction[j]
+        assign(contact.mu, given.friction)
         read_place(contact, given)
         place_on_bodies(model, data, contact, given)
-        count += 1
-    memory.contacts, memory.rows, memory.ncon = count, data.nefc, data.ncon
-    memory.first_dry, memory.dry = data.ne, data.nf
+        memory.contacts += 1
+
+
+@kernel
+def clear(contacts: Any) -> None:
+    """Make them new contacts, of which nothing is known: all words are zero, `NEW` as well."""
+    for n in range(len(contacts)):
+        contacts[n] = NEW
 
 
 @kernel
 def read_place(contact: Any, given: Any) -> None:
     """Read gap, place and axes of a contact."""
     contact.gap = given.dist
-    for j in range(3):
-        contact.pos[j] = given.pos[j]
-    for j in range(9):
-        contact.frame[j // 3, j % 3] = given.frame[j]
+    assign(contact.pos, given.pos)
+    for of in range(3):
+        assign(contact.frame[of], vector_at(given.frame, 3 * of))
 
 
 @kernel
 def place_on_bodies(model: Any, data: Any, contact: Any, given: Any) -> None:
     """Find where a contact is on both bodies, and its axes in those of their geoms."""
-    xpos = reals(data.geom_xpos, (model.ngeom, 3))
-    xmat = reals(data.geom_xmat, (model.ngeom, 3, 3))
+    assign(contact.geoms, given.geom)
     for side in range(2):
-        g = given.geom[side]
-        contact.geoms[side] = g
-        x = given.pos[0] - xpos[g, 0]
-        y = given.pos[1] - xpos[g, 1]
-        z = given.pos[2] - xpos[g, 2]
+        geom = given.geom[side]
+        axes, way = axes_of(model, data, geom), plus(given.pos, -1.0, place_of(model, data, geom))
+        assign(contact.place[side], applied(axes, way))
         for axis in range(3):
-            u, v, w = xmat[g, 0, axis], xmat[g, 1, axis], xmat[g, 2, axis]
-            contact.place[side, axis] = u * x + v * y + w * z
-            for of in range(3):
-                frame = contact.frame[of]
-                contact.axes[side, axis, of] = u * frame[0] + v * frame[1] + w * frame[2]
+            assign(contact.axes[side, axis], applied(contact.frame, axes[axis]))
     for axis in range(3):
         contact.normal[axis] = contact.axes[0, axis, 0]
-
-
-@kernel
-def clear(contact: Any) -> None:
-    """Make it a new contact, of which nothing is known."""
-    contact.state, contact.lift, contact.load = NEW, 0.0, 0.0
-    contact.predicted, contact.extrapolated = 0.0, 0.0
-    contact.shortfall, contact.bias, contact.error, contact.weakened = 0.0, 0.0, 0.0, 0
-    for axis in range(3):
-        contact.velocity[axis] = contact.turned[axis] = 0.0
-        for kind in range(2):
-            contact.carried[axis, kind] = 0.0
-            contact.friction[0, axis, kind] = contact.friction[1, axis, kind] = 0.0
 
 
 @kernel
@@ -234,8 +229,10 @@ def jacobian_length(model: Any, data: Any, memory: Any) -> int:
     """How many numbers the Jacobian of all rows has in mjData."""
     if not mj_isSparse(memory.model):
         return int(data.nefc * model.nv)
+    if data.nefc == 0:
+        return 0
     last, lengths = data.nefc - 1, integers(data.efc_J_rownnz, data.nefc)
-    return int(integers(data.efc_J_rowadr, data.nefc)[last] + lengths[last]) if last >= 0 else 0
+    return int(integers(data.efc_J_rowadr, data.nefc)[last] + lengths[last])
 
 
 @kernel
@@ -278,7 +275,7 @@ def moves(given: Any, n: int, dim: int, length: int) -> bool:
 def find_kinds(data: Any, memory: Any) -> None:
     """Find what each row is, and how many belong to a contact."""
     rows, limit = rows_of(memory), reals(data.efc_frictionloss, data.nefc)
-    found, contacts = engine_contacts(data.contact, data.ncon), contacts_of(memory)
+    found = engine_contacts(data.contact, data.ncon)
     for r in range(len(rows)):
         row = rows[r]
         row.kind, row.dim, row.remembered, row.limit = EQUALITY, 1, 0.0, limit[r]
@@ -290,9 +287,9 @@ def find_kinds(data: Any, memory: Any) -> None:
             rows[first].dim = found[i].dim
             for r in range(first + 1, first + found[i].dim):
                 rows[r].kind = IDLE
-    for i in range(memory.contacts):
-        for r in range(contacts[i].address, contacts[i].address + contacts[i].dim):
-            rows[r].kind = CONTACT_ROW
+    for contact in contacts_of(memory):
+        for row in rows_of_contact(memory, contact):
+            row.kind = CONTACT_ROW
 
 
 # -- matched ---------------------------------------------------------------------------------------
@@ -303,16 +300,8 @@ def square_apart(one: Any, other: Any) -> float:
     """Square of how far apart two contacts are on their bodies, m2; infinite for other geoms."""
     if not same_geoms(one.geoms, other.geoms):
         return math.inf
-    return float(square_way(one, other, 0) + square_way(one, other, 1))
-
-
-@kernel
-def square_way(one: Any, other: Any, side: int) -> float:
-    """Square of how far apart two contacts are on one of their bodies, m2."""
-    square = 0.0
-    for axis in range(3):
-        square += (one.place[side, axis] - other.place[side, axis]) ** 2
-    return square
+    first = square_between(one.place[0], other.place[0])
+    return float(first + square_between(one.place[1], other.place[1]))
 
 
 @kernel
@@ -325,8 +314,7 @@ def sort_pairs(model: Any, memory: Any) -> None:
     for i in range(memory.contacts):
         key, place = pair_of(model, contacts[i]), i
         while place > 0 and pairs[place - 1].geoms > key:
-            pairs[place].geoms = pairs[place - 1].geoms
-            pairs[place].contact = pairs[place - 1].contact
+            pairs[place] = pairs[place - 1]
             place -= 1
         pairs[place].geoms, pairs[place].contact = key, i
 
@@ -339,9 +327,10 @@ def pair_of(model: Any, contact: Any) -> int:
 
 
 @kernel
-def nearest(model: Any, memory: Any, old: Any) -> int:
-    """The contact of this step nearest to one before of these geoms; -1 if there is none. One whose
-    normal lies across isn't the same: inner walls of heightfields would inherit what cells bear."""
+def nearest(model: Any, memory: Any, old: Any) -> Any:
+    """The contact of this step nearest to one before of these geoms, and the square of how far that
+    has moved, m2; -1 and infinity if there is none. One whose normal lies across isn't the same:
+    inner walls of heightfields would inherit what cells bear."""
     contacts, pairs = contacts_of(memory), pairs_at(memory.pair_at, memory.contacts)
     key, low, high = pair_of(model, old), 0, len(pairs)
     while low < high:
@@ -354,25 +343,23 @@ def nearest(model: Any, memory: Any, old: Any) -> int:
     while low < len(pairs) and pairs[low].geoms == key:
         contact = contacts[pairs[low].contact]
         square = square_apart(contact, old)
-        if square < least and cosine(contact.normal, old.normal) >= ACROSS:
+        if square < least and dot(contact.normal, old.normal) >= ACROSS:
             best, least = pairs[low].contact, square
         low += 1
-    return int(best)
+    return best, least
 
 
 @kernel
 def match(model: Any, data: Any, memory: Any) -> float:
     """Let contacts inherit from those before; how far one has moved on its bodies at most, m."""
     contacts, before = contacts_of(memory), contacts_at(memory.before_at, memory.contacts_before)
-    sort_pairs(model, memory)
     farthest = 0.0
     for i in range(len(before)):
         old = before[i]
-        k = i if i < len(contacts) and square_apart(contacts[i], old) < UNMOVED**2 else -1
-        old.moved = 0.0
-        if k < 0:
-            k = nearest(model, memory, old)
-            old.moved = square_apart(contacts[k], old) if k >= 0 else math.inf
+        if i < len(contacts) and square_apart(contacts[i], old) < UNMOVED**2:
+            k, old.moved = i, 0.0
+        else:
+            k, old.moved = nearest(model, memory, old)
         if k >= 0:
             farthest = max(farthest, old.moved)
             inherit(model, data, memory, contacts[k], old)
@@ -411,21 +398,18 @@ def inherit(model: Any, data: Any, memory: Any, contact: Any, old: Any) -> None:
 @kernel
 def spin(model: Any, data: Any, contact: Any, side: int) -> float:
     """How fast one of the bodies in contact turns, rad/s."""
-    bodies, velocities = integers(model.geom_bodyid, model.ngeom), reals(data.cvel, 6 * model.nbody)
-    first = 6 * bodies[contact.geoms[side]]
-    x, y, z = velocities[first], velocities[first + 1], velocities[first + 2]
-    return math.sqrt(x**2 + y**2 + z**2)
+    body = integers(model.geom_bodyid, model.ngeom)[contact.geoms[side]]
+    velocity = vector_at(reals(data.cvel, 6 * model.nbody), 6 * body)
+    return math.sqrt(dot(velocity, velocity))
 
 
 @kernel
 def is_fixed(model: Any, memory: Any, old: Any, turning: float) -> bool:
     """Whether a contact has moved on its bodies by no more than it creeps, or a belt carries it,
     and they don't roll."""
-    creep = 0.0
-    for axis in range(3 if old.state == STICKS else 0):
-        creep += old.velocity[axis] ** 2
+    creep = math.sqrt(dot(old.velocity, old.velocity)) if old.state == STICKS else 0.0
     rolled = memory.law.fixed * turning * smaller_radius(model, old.geoms)
-    way = model.opt.timestep * (rolled + old.belt + math.sqrt(creep))
+    way = model.opt.timestep * (rolled + old.belt + creep)
     return bool(old.moved <= 2 * way**2)
 
 
@@ -434,7 +418,8 @@ def rolls(model: Any, memory: Any, contact: Any, old: Any) -> bool:
     """Whether a contact has rolled: as far over one of its bodies as over the other."""
     if old.state != STICKS:
         return False
-    one, other = math.sqrt(square_way(contact, old, 0)), math.sqrt(square_way(contact, old, 1))
+    one = math.sqrt(square_between(contact.place[0], old.place[0]))
+    other = math.sqrt(square_between(contact.place[1], old.place[1]))
     alike = abs(one - other) <= ALIKE * max(one, other)
     return bool(alike and max(one, other) <= FARTHEST * smaller_radius(model, old.geoms))
 
@@ -442,15 +427,15 @@ def rolls(model: Any, memory: Any, contact: Any, old: Any) -> bool:
 @kernel
 def remember_forces(memory: Any) -> None:
     """Give the rows of contacts and of dry friction the forces that are remembered."""
-    contacts, rows = contacts_of(memory), rows_of(memory)
-    for i in range(memory.contacts):
-        contact = contacts[i]
-        rows[contact.address].remembered = contact.load
+    for contact in contacts_of(memory):
+        rows = rows_of_contact(memory, contact)
+        rows[0].remembered = contact.load
         for t in range(contact.dim - 1):
-            rows[contact.address + 1 + t].remembered = contact.carried[axis_of(t), kind_of(t)]
+            rows[1 + t].remembered = contact.carried[axis_of(t), kind_of(t)]
     known, dry = memory.dry_before == memory.dry, dry_of(memory, memory.dry)
-    for i in range(memory.dry):
-        rows[memory.first_dry + i].remembered = dry[i] if known else 0.0
+    rows = dry_rows_of(memory)
+    for i in range(len(rows)):
+        rows[i].remembered = dry[i] if known else 0.0
 
 
 @kernel

@@ -12,7 +12,7 @@ import math
 from typing import Any
 
 from .compiling import kernel
-from .contacts import cosine, leave_out, same_geoms, smaller_radius
+from .contacts import axes_of, leave_out, place_of, same_geoms, smaller_radius
 from .engine import HEIGHTFIELD, engine_contacts, integers, reals, singles
 from .memory import contacts_of
 from .parameters import ALIGNED, AT_MOST, EDGE, LEVEL
@@ -95,30 +95,25 @@ def piece_of(model: Any, contact: Any) -> int:
 def lies_below(model: Any, data: Any, edge: Any, floor: Any) -> bool:
     """Whether the piece to which an edge belongs lies below a contact of the same moving geom with
     another piece, with another normal. What rolls over the rim of a piece needs both contacts."""
-    parallel = abs(cosine(edge.frame[0], floor.frame[0])) >= 1 - ALIGNED
+    parallel = abs(dot(edge.frame[0], floor.frame[0])) >= 1 - ALIGNED
     if parallel or same_geoms(edge.geoms, floor.geoms):
         return False
     if edge.geoms[1 - edge.piece] != floor.geoms[1 - floor.piece]:
         return False
-    up = 1.0 if floor.piece == 0 else -1.0  # normals point from the first geom to the second
-    height = height_above(model, data, edge.geoms[edge.piece], floor, up)
+    up = times_vector(1.0 if floor.piece == 0 else -1.0, floor.frame[0])  # out of the floor
+    height = height_above(model, data, edge.geoms[edge.piece], floor.pos, up)
     return bool(height <= EDGE * smaller_radius(model, edge.geoms) + max(-floor.gap, 0.0))
 
 
 @kernel
-def height_above(model: Any, data: Any, piece: int, floor: Any, up: float) -> float:
-    """How far a piece, with its bounding box, reaches beyond a contact, along its normal times
-    `up`, m."""
-    place = reals(data.geom_xpos, (model.ngeom, 3))[piece]
-    axes = reals(data.geom_xmat, (model.ngeom, 3, 3))[piece]
-    box, height = reals(model.geom_aabb, (model.ngeom, 6))[piece], 0.0
+def height_above(model: Any, data: Any, piece: int, point: Any, up: Any) -> float:
+    """How far a piece, with its bounding box, reaches beyond a point along a unit vector, m."""
+    box = reals(model.geom_aabb, (model.ngeom, 6))[piece]
+    height = dot(up, plus(place_of(model, data, piece), -1.0, point))
+    leans = applied(axes_of(model, data, piece), up)
     for axis in range(3):
-        along = 0.0
-        for j in range(3):
-            along += up * floor.frame[0, j] * axes[j, axis]
-        height += up * floor.frame[0, axis] * (place[axis] - floor.pos[axis])
-        height += along * box[axis] + abs(along) * box[3 + axis]
-    return height
+        height += leans[axis] * box[axis] + abs(leans[axis]) * box[3 + axis]
+    return float(height)
 
 
 @kernel
@@ -133,22 +128,15 @@ def is_steeper(model: Any, data: Any, edge: Any) -> bool:
 def turn_to_cells(model: Any, data: Any, edge: Any, given: Any) -> None:
     """Turn a contact with an inner wall of a heightfield to the cells around it."""
     normal, given.dist = of_cells(model, data, edge)
-    set_axes(given.frame, normal, axes_of(model, data, edge)[0])
-
-
-@kernel
-def axes_of(model: Any, data: Any, edge: Any) -> Any:
-    """The axes of what is at rest in a contact."""
-    turn = reals(data.geom_xmat, (model.ngeom, 9))[edge.geoms[edge.piece]]
-    return (turn[0], turn[3], turn[6]), (turn[1], turn[4], turn[7]), (turn[2], turn[5], turn[8])
+    set_axes(given.frame, normal, axes_of(model, data, edge.geoms[edge.piece])[0])
 
 
 @kernel
 def of_cells(model: Any, data: Any, edge: Any) -> Any:
     """The normal that cells around a contact with a heightfield have nearest to its own, and how
     high the point of the other body is above them, m."""
-    piece, axes = edge.geoms[edge.piece], axes_of(model, data, edge)
-    place, own = reals(data.geom_xpos, (model.ngeom, 3))[piece], edge.frame[0]
+    piece, own = edge.geoms[edge.piece], edge.frame[0]
+    axes, place = axes_of(model, data, piece), place_of(model, data, piece)
     point = plus(plus(edge.pos, edge.gap / 2, own), -1.0, place)
     point, leans = applied(axes, point), applied(axes, own)
     level, field = max(leans[2], LEVEL), integers(model.geom_dataid, model.ngeom)[piece]

@@ -8,12 +8,10 @@ from typing import Any
 
 from .compiling import kernel
 from .contacts import (
-    SIZE,
-    WORDS,
-    copy,
-    cosine,
-    kinds,
+    in_world,
     leave_out,
+    place_of,
+    radii,
     read_place,
     same_geoms,
     smaller_radius,
@@ -26,6 +24,7 @@ from .engine import (
     MOST_POINTS,
     POINT,
     engine_contacts,
+    integers,
     mj_addContact,
     mj_fwdVelocity,
     mj_island,
@@ -37,20 +36,16 @@ from .engine import (
 from .memory import NEW, contacts_at, contacts_of
 from .parameters import ACROSS, AT_MOST, FARTHEST, FASTER, UNMOVED
 from .rigid import depth_kept
-from .vectors import cross, dot, plus, times_vector, vector_at
+from .vectors import assign, cross, dot, plus, square_between, times_vector, vector_at
 
 
 @kernel
-def put_points_back(model: Any, data: Any, memory: Any) -> bool:
-    """Put back points of flat contacts that the collider has dropped while they overlap.
-
-    Returns whether there were any: the constraint rows are then made anew.
-    """
+def put_points_back(model: Any, data: Any, memory: Any) -> int:
+    """Put back points of flat contacts that the collider has dropped while they overlap; return how
+    many. The constraint rows are then to be made anew."""
     before, added = contacts_at(memory.before_at, memory.contacts_before), 0
-    radius = reals(model.geom_rbound, model.ngeom)
-    for i in range(len(before)):
-        old = before[i]
-        one, other = radius[old.geoms[0]], radius[old.geoms[1]]
+    for old in before:
+        one, other = radii(model, old.geoms)
         least, far = memory.law.near * max(one, other), FARTHEST * smaller_radius(model, old.geoms)
         near = min(least, far)  # floors may be much larger
         turned = one * spin(model, data, old, 0) + other * spin(model, data, old, 1)
@@ -62,17 +57,15 @@ def put_points_back(model: Any, data: Any, memory: Any) -> bool:
         if overlaps and is_lost(data, old, near):
             add_point(data, memory, old)
             added += 1
-    if added:
-        make_rows_anew(memory)
-    return added > 0
+    return added
 
 
 @kernel
-def add_points_below(model: Any, data: Any, memory: Any) -> bool:
-    """Add points of faces that the collider hasn't taken: those without margin.
+def add_points_below(model: Any, data: Any, memory: Any) -> int:
+    """Add points of faces that the collider hasn't taken, those without margin; return how many.
 
     It takes four of them, however far they are within the margin: a body that tips about two would
-    have none where it comes down. Returns whether there were any.
+    have none where it comes down. The constraint rows are then to be made anew.
     """
     contacts, first, added = contacts_of(memory), 0, 0
     while first < memory.contacts:
@@ -83,34 +76,31 @@ def add_points_below(model: Any, data: Any, memory: Any) -> bool:
         if rises and after - first >= 4 and has_flat_faces(model, contacts[first].geoms):
             added += add_points_without_margin(model, data, memory, contacts[first])
         first = after
-    if added:
-        make_rows_anew(memory)
-    return added > 0
+    return added
 
 
 @kernel
 def has_flat_faces(model: Any, geoms: Any) -> bool:
     """Whether the points of two geoms are those of two faces of which one may be no rectangle."""
-    least, most = kinds(model, geoms)
-    return bool(least >= CYLINDER and most <= MESH and not least == most == BOX)
+    types = integers(model.geom_type, model.ngeom)
+    one, other = types[geoms[0]], types[geoms[1]]
+    flat = CYLINDER <= one <= MESH and CYLINDER <= other <= MESH
+    return bool(flat and not one == other == BOX)
 
 
 @kernel
 def add_points_without_margin(model: Any, data: Any, memory: Any, like: Any) -> int:
     """Add the points that the geoms of a contact have without margin; return how many. The contact
     stands for each of them meanwhile."""
-    stride, added = POINT // 8, 0
-    points = reals(memory.patch_at, MOST_POINTS * stride)
-    radius = reals(model.geom_rbound, model.ngeom)
-    near = memory.law.near * max(radius[like.geoms[0]], radius[like.geoms[1]])
+    near, added = memory.law.near * max(radii(model, like.geoms)), 0
+    points = reals(memory.patch_at, (MOST_POINTS, POINT // 8))
     count = mjc_Convex(
         memory.model, memory.data, memory.patch_at, like.geoms[0], like.geoms[1], 0.0
     )
     for k in range(count):
-        point = points[k * stride : k * stride + 7]
-        like.gap = point[0]
-        for j in range(3):
-            like.pos[j], like.frame[0, j] = point[1 + j], point[4 + j]
+        like.gap = points[k, 0]
+        assign(like.pos, vector_at(points[k], 1))
+        assign(like.frame[0], vector_at(points[k], 4))
         if like.gap < 0 and not has_near(data, like, near):
             add_point(data, memory, like)
             added += 1
@@ -125,18 +115,17 @@ def leave_added_points_out(model: Any, data: Any, memory: Any) -> bool:
     They are deeper than the bodies can have come in a step: their springs would throw these apart.
     Returns whether there were any.
     """
-    contacts, found = contacts_of(memory), engine_contacts(data.contact, data.ncon)
+    found = engine_contacts(data.contact, data.ncon)
     before, left_out = contacts_at(memory.before_at, memory.contacts_before), False
     velocity = reals(data.efc_vel, data.nefc)
-    for i in range(memory.contacts):
-        new = contacts[i]
+    for new in contacts_of(memory):
         closing = max(-velocity[new.address], 0.0) * model.opt.timestep
         if new.state != NEW or -new.gap <= UNMOVED + AT_MOST * closing:
             continue
         had, kept = 0, True
-        for k in range(len(before)):
-            if same_geoms(before[k].geoms, new.geoms):
-                had, kept = had + 1, kept and before[k].moved < UNMOVED**2
+        for old in before:
+            if same_geoms(old.geoms, new.geoms):
+                had, kept = had + 1, kept and old.moved < UNMOVED**2
         if kept and had > 2:
             leave_out(data, found[new.index])
             left_out = True
@@ -155,24 +144,22 @@ def make_rows_anew(memory: Any) -> None:
 @kernel
 def place_lost_point(model: Any, data: Any, old: Any) -> None:
     """Where a contact before would be now: its normal, its place, and the gap that has opened."""
-    xpos = reals(data.geom_xpos, (model.ngeom, 3))
-    xmat = reals(data.geom_xmat, (model.ngeom, 3, 3))
-    normal, along, opened = old.frame[0], old.frame[1], 0.0
-    for j in range(3):
-        normal[j], old.pos[j], along[j] = 0.0, 0.0, 0.0
-        for axis in range(3):
-            normal[j] += xmat[old.geoms[0], j, axis] * old.normal[axis]
-        for side in range(2):
-            place = xpos[old.geoms[side], j]
-            for axis in range(3):
-                place += xmat[old.geoms[side], j, axis] * old.place[side, axis]
-            old.pos[j] += place / 2
-            along[j] += place if side else -place
-        opened += normal[j] * along[j]
+    normal = in_world(model, data, old.geoms[0], old.normal)
+    one, other = place_on(model, data, old, 0), place_on(model, data, old, 1)
+    way = plus(other, -1.0, one)
+    opened = dot(normal, way)
     old.gap += opened
-    old.moved = 0.0  # along the surface, square, m2
-    for j in range(3):
-        old.moved += (along[j] - opened * normal[j]) ** 2
+    along = plus(way, -opened, normal)
+    old.moved = dot(along, along)
+    assign(old.frame[0], normal)
+    assign(old.pos, plus(one, 0.5, way))
+
+
+@kernel
+def place_on(model: Any, data: Any, contact: Any, side: int) -> Any:
+    """Where the place of a contact on one of its bodies is now, m."""
+    geom = contact.geoms[side]
+    return plus(place_of(model, data, geom), 1.0, in_world(model, data, geom, contact.place[side]))
 
 
 @kernel
@@ -181,27 +168,24 @@ def is_lost(data: Any, old: Any, near: float) -> bool:
     corners of a polygon, and of a heightfield, it takes some by turns."""
     found, closed = engine_contacts(data.contact, data.ncon), False
     for i in range(data.ncon):
-        if is_of_face(found[i].geom, found[i].frame, old):
+        if is_of_face(found[i], old):
             closed, old.index = closed or found[i].dist <= 0, i
     return bool(closed and not has_near(data, old, near))
 
 
 @kernel
-def is_of_face(geoms: Any, normal: Any, old: Any) -> bool:
-    """Whether a point is one of the two faces of a contact: those whose normals lie across are of
-    inner walls of a heightfield, which come and go."""
-    return bool(same_geoms(geoms, old.geoms) and cosine(normal, old.frame[0]) >= ACROSS)
+def is_of_face(point: Any, contact: Any) -> bool:
+    """Whether a point of mjData is one of the two faces of a contact: those whose normals lie
+    across are of inner walls of a heightfield, which come and go."""
+    across = dot(point.frame, contact.frame[0]) < ACROSS
+    return bool(same_geoms(point.geom, contact.geoms) and not across)
 
 
 @kernel
 def has_near(data: Any, contact: Any, near: float) -> bool:
     """Whether mjData has a point of these two faces near this one."""
-    found = engine_contacts(data.contact, data.ncon)
-    for i in range(data.ncon):
-        square = 0.0
-        for j in range(3):
-            square += (found[i].pos[j] - contact.pos[j]) ** 2
-        if square <= near**2 and is_of_face(found[i].geom, found[i].frame, contact):
+    for point in engine_contacts(data.contact, data.ncon):
+        if square_between(point.pos, contact.pos) <= near**2 and is_of_face(point, contact):
             return True
     return False
 
@@ -209,12 +193,12 @@ def has_near(data: Any, contact: Any, near: float) -> bool:
 @kernel
 def add_point(data: Any, memory: Any, old: Any) -> None:
     """Add a lost point to mjData, else as the last of its pair of geoms there is."""
-    copy(data.contact + SIZE * old.index, memory.point_at, WORDS)
-    point = engine_contacts(memory.point_at, 1)[0]
+    points = engine_contacts(memory.point_at, 1)
+    points[0] = engine_contacts(data.contact, data.ncon)[old.index]
+    point = points[0]
     set_axes(point.frame, vector_at(old.frame[0], 0), vector_at(point.frame, 3))
     point.dist = old.gap
-    for j in range(3):
-        point.pos[j] = old.pos[j]
+    assign(point.pos, old.pos)
     mj_addContact(memory.model, memory.data, memory.point_at)
 
 

@@ -11,7 +11,7 @@ import math
 from typing import Any
 
 from .compiling import kernel
-from .contacts import cosine, smaller_radius
+from .contacts import smaller_radius
 from .engine import integers, mj_factorM, mj_fwdActuation, mjd_smooth_vel, reals
 from .friction import shift
 from .memory import (
@@ -159,7 +159,7 @@ def same_face(model: Any, one: Any, other: Any) -> bool:
     bodies = integers(model.geom_bodyid, model.ngeom)
     same = bodies[one.geoms[0]] == bodies[other.geoms[0]]
     same = same and bodies[one.geoms[1]] == bodies[other.geoms[1]]
-    return bool(same and cosine(one.frame[0], other.frame[0]) > 1 - ALIGNED)
+    return bool(same and dot(one.frame[0], other.frame[0]) > 1 - ALIGNED)
 
 
 @kernel

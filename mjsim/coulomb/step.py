@@ -65,18 +65,17 @@ def update_contacts(
         contacts.read_gaps(data, memory)
         return
     hand_on(model, data, memory, known)
-    contacts.find(model, data, memory)
-    anew = False
-    if contacts.match(model, data, memory) > memory.least:
-        anew = patches.put_points_back(model, data, memory)
+    added = 0
+    if contacts.find(model, data, memory) > memory.least:
+        added += patches.put_points_back(model, data, memory)
     if memory.law.rigid:
-        anew |= patches.add_points_below(model, data, memory)
-    if anew or patches.leave_added_points_out(model, data, memory):
+        added += patches.add_points_below(model, data, memory)
+    if added:
+        patches.make_rows_anew(memory)
+    if added or patches.leave_added_points_out(model, data, memory):
         contacts.find(model, data, memory)
-        contacts.match(model, data, memory)
     if edges.leave_inner_edges_out(model, data, memory):
         contacts.find(model, data, memory)
-        contacts.match(model, data, memory)
     contacts.copy_jacobians(model, data, memory)
     rows.find_surfaces(model, data, memory)
     contacts.remember_forces(memory)

@@ -35,6 +35,13 @@ def plus(a: Any, x: float, b: Any) -> Any:
 
 
 @kernel
+def square_between(a: Any, b: Any) -> float:
+    """The square of the distance between two points."""
+    way = plus(a, -1.0, b)
+    return float(dot(way, way))
+
+
+@kernel
 def applied(matrix: Any, a: Any) -> Any:
     """A matrix, as a tuple of its rows, times a vector."""
     return dot(matrix[0], a), dot(matrix[1], a), dot(matrix[2], a)
@@ -56,3 +63,10 @@ def rotated(a: Any, turn: Any) -> Any:
         (1 - math.cos(angle)) / square,
         cross(turn, across),
     )
+
+
+@kernel
+def assign(target: Any, values: Any) -> None:
+    """Give the numbers of an array these values."""
+    for i in range(len(target)):
+        target[i] = values[i]
