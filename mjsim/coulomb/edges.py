@@ -27,23 +27,18 @@ def leave_inner_edges_out(model: Any, data: Any, memory: Any) -> bool:
 
     Returns whether there were any.
     """
-    contacts, found = contacts_of(memory), engine_contacts(data.contact, data.ncon)
-    on_floor, count = integers(memory.floor_at, memory.contacts), 0
-    left_out = turned = False
-    for i in range(memory.contacts):
-        contact = contacts[i]
+    found, left_out, turned = engine_contacts(data.contact, data.ncon), False, False
+    for contact in contacts_of(memory):
         contact.piece = piece_of(model, contact)
-        if contact.piece >= 0:
-            contact.steeper = on_hill(model, contact) and is_steeper(model, data, contact)
-            on_floor[count], count = i, count + 1
-    for i in on_floor[:count]:
-        edge, hill = contacts[i], on_hill(model, contacts[i])
-        if not (edge.steeper if hill else closes(model, data, memory, edge)):
+        contact.steeper = on_hill(model, contact) and is_steeper(model, data, contact)
+    for edge in contacts_of(memory):
+        hill = on_hill(model, edge)
+        if edge.piece < 0 or not (edge.steeper if hill else closes(model, data, memory, edge)):
             continue
         needed, others = 2 if hill else 1, 0
-        for k in on_floor[:count]:
-            if others < needed and not found[contacts[k].index].exclude:
-                others += makes_inner(model, data, edge, contacts[k], hill)
+        for floor in contacts_of(memory):
+            if others < needed and floor.piece >= 0 and not found[floor.index].exclude:
+                others += makes_inner(model, data, edge, floor, hill)
         if others == needed:
             leave_out(data, found[edge.index])
             left_out = True
@@ -67,7 +62,7 @@ def makes_inner(model: Any, data: Any, edge: Any, floor: Any, hill: bool) -> boo
 def on_hill(model: Any, contact: Any) -> bool:
     """Whether what is at rest in a contact is a heightfield."""
     types = integers(model.geom_type, model.ngeom)
-    return bool(types[contact.geoms[contact.piece]] == HEIGHTFIELD)
+    return bool(contact.piece >= 0 and types[contact.geoms[contact.piece]] == HEIGHTFIELD)
 
 
 @kernel

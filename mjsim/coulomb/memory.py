@@ -173,7 +173,7 @@ MEMORY = np.dtype(
         *((f"room_{name}", _i8) for name in ("contacts", "rows", "jacobian")),
         *((f"{name}_at", _i8) for name in ("contact", "before", "row", "jacobian", "column")),
         *((f"{name}_at", _i8) for name in ("dry", "pose", "pair", "xpos", "xmat", "body")),
-        *((f"{name}_at", _i8) for name in ("point", "patch", "floor", "restitution", "dof")),
+        *((f"{name}_at", _i8) for name in ("point", "patch", "restitution", "dof")),
         # the island that is solved: how many degrees of freedom and units it has; by their numbers
         # in it, accelerations, those tried, a step to these, what is left of the equations
         ("size", _i8),
@@ -335,8 +335,7 @@ class Simulation:
         """Make the arrays at least so long; what they hold stays."""
         wanted = {"contacts": contacts, "rows": rows, "jacobian": jacobian}
         kinds: dict[str, dict[str, Any]] = {
-            "contacts": {"contact": CONTACT, "before": CONTACT, "pose": MJ_CONTACT}
-            | {"pair": PAIR, "floor": np.int32},
+            "contacts": {"contact": CONTACT, "before": CONTACT, "pose": MJ_CONTACT, "pair": PAIR},
             "rows": {"row": ROW, "dry": np.float64, "unit": np.int32},
             "jacobian": {"jacobian": np.float64, "column": np.int32, "place": np.int32},
         }

@@ -196,7 +196,7 @@ def add_point(data: Any, memory: Any, old: Any) -> None:
     points = engine_contacts(memory.point_at, 1)
     points[0] = engine_contacts(data.contact, data.ncon)[old.index]
     point = points[0]
-    set_axes(point.frame, vector_at(old.frame[0], 0), vector_at(point.frame, 3))
+    set_axes(point.frame, old.frame[0], vector_at(point.frame, 3))
     point.dist = old.gap
     assign(point.pos, old.pos)
     mj_addContact(memory.model, memory.data, memory.point_at)
