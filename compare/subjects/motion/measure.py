@@ -40,7 +40,7 @@ from compare.method.together import Procedure, stepped, together
 from model import Case, Contact, Flow, Parameters, State, Trajectory
 from model.arrays import Array
 from model.cases import TRAITS
-from model.drag import QUADRATIC, STOKES
+from model.drag import QUADRATIC, SCHILLER_NAUMANN, STOKES
 from model.kinematics import SLIP_XYZ, TURNING, VARIABLES, slip_velocities, state_units
 
 RUN_LENGTH = 768  # length of a run in coarse steps, which is about 40 sqrt(R/g), and its samples
@@ -423,10 +423,11 @@ def _ends(piece: StepPairResult) -> tuple[list[float], ...]:
 
 
 def changes(run: Trajectory) -> bool:
-    """Whether the case changes in a run, or the ball leaves at once the floor on which it begins:
-    forces then lag behind, and steps may by chance agree."""
+    """Whether the case changes in a run, or the ball leaves at once the floor on which it begins,
+    or its law of drag has a corner: forces then lag behind, and steps may by chance agree."""
     leaves = run.y[0] == 0 and Case(int(run.case[0])).A is Contact.N
-    return bool(np.ptp(run.case) or leaves)
+    corner = run.header.parameters.drag == SCHILLER_NAUMANN
+    return bool(np.ptp(run.case) or leaves or corner)
 
 
 def closes(run: Trajectory) -> bool:
