@@ -29,8 +29,8 @@ TABLE = np.dtype(
         ("ask", np.int64),  # the function of Python that is told of simulations unknown here
         ("models", np.int64),  # how many models are installed
         ("model_at", np.int64),
-        ("simulations", np.int64),  # how many are known: addresses of their mjData and memories
-        ("known_at", np.int64),
+        ("simulations", np.int64),  # how many are known, by the address of their mjData
+        ("known_at", np.int64),  # where these addresses are, and then those of their memories
     ],
     align=True,
 )
@@ -47,10 +47,12 @@ _table, _tables = address_of(f"{__package__}.table", table), array_at(TABLE)
 def memory_of(m: int, d: int) -> int:
     """Address of the memory of a simulation; 0 if it is not under the law."""
     table = _tables(words(_table(), 1)[0], 1)[0]
-    known = words(table.known_at, (table.simulations, 2))
-    for i in range(table.simulations):
-        if known[i, 0] == d and memories(known[i, 1], 1)[0].model == m:
-            return int(known[i, 1])
+    known = words(table.known_at, (2, table.simulations))
+    place = np.searchsorted(known[0], d)
+    if place < table.simulations and known[0, place] == d:
+        found = known[1, place]
+        if memories(found, 1)[0].model == m:
+            return int(found)
     for model in words(table.model_at, table.models):
         if model == m:
             return int(call(table.ask, m, d))
@@ -108,12 +110,13 @@ class Callback:
         self._tables += 1
         number, simulations = self._tables, dict(self._simulations)
         models = np.array([*self._installed], np.int64)
-        known = np.array([(data, of.address) for data, of in simulations.items()], np.int64)
+        addresses = sorted((data, each.address) for data, each in simulations.items())
+        known = np.array(addresses, np.int64).reshape(-1, 2).T.copy()
         new: Any = np.zeros(1, TABLE)
         new["previous"] = self._before or 0
         new["ask"] = ctypes.cast(self._ask, ctypes.c_void_p).value
         new["models"], new["model_at"] = len(models), models.ctypes.data
-        new["simulations"], new["known_at"] = len(known), known.ctypes.data
+        new["simulations"], new["known_at"] = len(addresses), known.ctypes.data
         kept, address = [*self._in_force[-7:], (new, models, known)], new.ctypes.data
         if number == self._tables:
             self._in_force, table[0] = kept, address

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import math
 import sys
 import warnings
@@ -193,6 +194,11 @@ class Coulomb:
             simulation.restore(self._restored)
         return simulation
 
+    @functools.cached_property
+    def _fresh(self) -> Mapping[str, npt.NDArray[Any]]:
+        """The state of a simulation that has just begun."""
+        return Simulation(self.model, self._law).state()
+
     def reset(self) -> None:
         """Forget all, as after `mj_resetData`; a jump of `data.time` does so, too."""
         self._restored = None
@@ -235,7 +241,7 @@ class Coulomb:
         ValueError
             If it isn't one of this model.
         """
-        check_state(state, self.model, self._law)
+        check_state(state, self._fresh, self.model)
         if data is not None:
             self._simulation(data).restore(state)
             return

@@ -396,9 +396,11 @@ class Simulation:
         record["pending"], record["stored"], record["ncon"] = 0, 1, -1
 
 
-def check_state(state: Mapping[str, npt.NDArray[Any]], model: Any, law: Law) -> None:
-    """Raise `ValueError` unless it is a state of a simulation of this model."""
-    for name, like in Simulation(model, law).state().items():
+def check_state(
+    state: Mapping[str, npt.NDArray[Any]], fresh: Mapping[str, npt.NDArray[Any]], model: Any
+) -> None:
+    """Raise `ValueError` unless it is a state of a simulation of this model, like a fresh one."""
+    for name, like in fresh.items():
         try:
             values: Any = np.asarray(state[name])
         except (KeyError, TypeError, IndexError, ValueError) as error:
