@@ -133,11 +133,8 @@ def find_turning(
     Of what slides softly there is none, unless friction could end that within the contact's time:
     else that would never end on a turntable.
     """
-    rigid, sticks, rows = (
-        memory.law.rigid,
-        contact.state == STICKS,
-        rows_of_contact(memory, contact),
-    )
+    rigid, sticks = memory.law.rigid, contact.state == STICKS
+    rows = rows_of_contact(memory, contact)
     damping = reals(data.efc_KBIP, (data.nefc, 4))[contact.address + 1, 1] if known else 0.0
     lost = 1.0 if rigid else min(model.opt.timestep * damping, 1.0)
     slip = math.hypot(rows[1].velocity, rows[2].velocity) if known else 0.0

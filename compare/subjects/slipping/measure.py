@@ -416,8 +416,8 @@ def _around(seen: Growths, first: Push, power: int, near: Sequence[float]) -> li
     if not 0 < zero < (MOST_FOLLOWED * max(seen.flows)) ** power:
         return []
     held, pushes = State.of(first.start.x0).omega_c, []
+    least = held if power == 1 else 0.0
     for factor in near:
-        least = held if power == 1 else 0.0
         omega_0 = float(least + (zero ** (1 / power) - least) * factor)
         orbit = held if power == 1 else omega_0
         p, x0 = first.start.p.replace(omega_0=omega_0), State(omega_c=orbit).stacked()
