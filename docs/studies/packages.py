@@ -10,9 +10,10 @@ import sys
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -20,7 +21,6 @@ import numpy as np
 from docs.studies.tables import write
 from docs.studies.ways import WAYS, Way, processor_time
 
-KINDS = ("plain", "soft", "rigid")
 LASTS, LONGEST = 1.0, 300.0
 """How long a model runs, s of its own time; and of ours, before it is given up."""
 STILL = 1e-3
@@ -29,16 +29,27 @@ STILL = 1e-3
 
 @dataclass(frozen=True)
 class Run:
-    """What became of a model. `cost`: processor time of all steps, s; NaN if it was refused."""
+    """What became of a model; of one that is `refused` there is nothing else.
 
+    `cost` is the processor time of all steps, s; `touches` and `rests` are said of their end."""
+
+    refused: bool = False
     cost: float = math.nan
     blows_up: bool = False
     touches: bool = False
     rests: bool = False
 
 
+class Runs(NamedTuple):
+    """Those of a model."""
+
+    plain: Run
+    soft: Run
+    rigid: Run
+
+
 def run(path: Path, way: Way) -> Run:
-    """Run a model; of warnings MuJoCo resets a simulation after those of its state alone."""
+    """Run a model. It blows up if MuJoCo warns of its state, and resets it."""
     model = mujoco.MjModel.from_xml_path(str(path))
     model.opt.noslip_iterations = 0
     data = mujoco.MjData(model)
@@ -47,49 +58,77 @@ def run(path: Path, way: Way) -> Run:
     try:
         stepper = way.begin(model)
     except ValueError:
-        return Run()
+        return Run(refused=True)
     stepper.step(data)  # compiles
     cost = processor_time(partial(stepper.step, data, round(LASTS / model.opt.timestep)))
     bad = (getattr(mujoco.mjtWarning, f"mjWARN_BAD{what}") for what in ("QPOS", "QVEL", "QACC"))
     blows_up = any(data.warning[each].number for each in bad)
     rests = float(np.abs(data.qvel).max()) < STILL
-    return Run(cost, blows_up, bool(data.ncon), rests)
+    return Run(False, cost, blows_up, bool(data.ncon), rests)
 
 
-def runs(path: Path) -> list[Run]:
-    """Those of all kinds; none of what isn't a model of something that moves."""
+def runs(path: Path) -> Runs | None:
+    """Those of a file; None if it isn't a model of something that moves."""
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
     except ValueError:
-        return []
-    return [run(path, WAYS[kind]) for kind in KINDS] if model.nv and model.ngeom else []
+        return None
+    moves = model.nv > 0 and model.ngeom > 0
+    return Runs(*(run(path, WAYS[kind]) for kind in Runs._fields)) if moves else None
 
 
-def apart(path: Path) -> list[Run] | None:
-    """The same in a process of its own; None if that ended or hung."""
-    with ProcessPoolExecutor(1) as pool:
-        try:
-            return pool.submit(runs, path).result(LONGEST)
-        except (BrokenProcessPool, TimeoutError):
-            for process in pool._processes.values():
-                process.kill()
-            return None
+@dataclass(frozen=True)
+class Package:
+    """What became of its models."""
+
+    name: str
+    runs: list[Runs] = field(default_factory=list)
+    ended: list[Path] = field(default_factory=list)
+    """Those whose process ended, or hung."""
 
 
-def row(name: str, found: Sequence[list[Run] | None]) -> list[str]:
+def tried(folder: Path) -> Package:
+    """Try all models of a package, each in a process of its own."""
+    package = Package(folder.name)
+    for path in sorted(folder.rglob("*.xml")):
+        with ProcessPoolExecutor(1) as pool:
+            try:
+                found = pool.submit(runs, path).result(LONGEST)
+            except (BrokenProcessPool, TimeoutError):
+                print(f"{path}: its process ended, or hung", file=sys.stderr)
+                package.ended.append(path)
+                for process in pool._processes.values():
+                    process.kill()
+                continue
+        if found:
+            package.runs.append(found)
+    return package
+
+
+def counts(said: Sequence[Sequence[bool]]) -> list[str]:
+    """Of how many models something is true, in plain MuJoCo, by soft and by rigid contacts."""
+    return [str(count) for count in np.array(said, bool).reshape(-1, 3).sum(axis=0)]
+
+
+def cost(runs: Sequence[tuple[Run, Run]]) -> str:
+    """The cost of the second of two runs in units of the first: the median, and what one in ten
+    exceeds."""
+    shares = [run.cost / plain.cost for plain, run in runs]
+    return "{:.1f} ({:.1f})".format(*np.quantile(shares, [0.5, 0.9])) if shares else "–"
+
+
+def row(package: Package) -> list[str]:
     """The row of a package, or of all."""
-    ran = [each for each in found if each]
-    cells = [name, str(len(ran)), str(found.count(None))]
-    cells += [str(sum(each[k].blows_up for each in ran)) for k in range(len(KINDS))]
-    cells.append(str(sum(math.isnan(each[-1].cost) for each in ran)))
-    touching = [each for each in ran if each[0].touches and not math.isnan(each[-1].cost)]
-    cells.append(str(len(touching)))
-    cells += [str(sum(each[k].rests for each in touching)) for k in range(len(KINDS))]
-    for k in range(1, len(KINDS)):
-        costs = [each[k].cost / each[0].cost for each in touching]
-        least, most = np.quantile(costs, [0.5, 0.9]) if costs else (math.nan, math.nan)
-        cells.append(f"{least:.1f} ({most:.1f})" if costs else "–")
-    return cells
+    refused = [each for each in package.runs if each.rigid.refused]
+    touching = [each for each in package.runs if each.plain.touches and not each.rigid.refused]
+    return [
+        *(package.name, str(len(package.runs)), str(len(package.ended))),
+        *counts([[run.blows_up for run in runs] for runs in package.runs]),
+        *(str(len(refused)), str(len(touching))),
+        *counts([[run.rests for run in runs] for runs in touching]),
+        cost([(each.plain, each.soft) for each in touching]),
+        cost([(each.plain, each.rigid) for each in touching]),
+    ]
 
 
 def main() -> int:
@@ -98,16 +137,16 @@ def main() -> int:
     parser.add_argument("page", type=Path, metavar="FILE", help="docs/records/packages.md")
     parser.add_argument("packages", type=Path, metavar="DIR", help="a folder of unpacked packages")
     args = parser.parse_args()
-    head = ["package", "models", "crash or hang", *(f"{kind} blows up" for kind in KINDS)]
-    head += ["rigid refused", "touch", *(f"{kind} at rest" for kind in KINDS)]
-    rows = [[*head, "cost of soft", "cost of rigid"]]
-    everything: list[list[Run] | None] = []
+    head = ["package", "models", "crash or hang", *(f"{kind} blows up" for kind in Runs._fields)]
+    head += ["rigid refused", "touch", *(f"{kind} at rest" for kind in Runs._fields)]
+    rows, every = [[*head, "cost of soft", "cost of rigid"]], Package("all")
     for folder in sorted(args.packages.iterdir()):
-        found = [apart(path) for path in sorted(folder.rglob("*.xml"))]
-        rows.append(row(folder.name, found))
-        everything += found
+        package = tried(folder)
+        rows.append(row(package))
+        every.runs.extend(package.runs)
+        every.ended.extend(package.ended)
         print(" | ".join(rows[-1]), flush=True)
-    write(args.page, "packages", [*rows, row("all", everything)])
+    write(args.page, "packages", [*rows, row(every)])
     return 0
 
 
