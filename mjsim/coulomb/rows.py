@@ -75,7 +75,7 @@ def put_rows_back(data: Any, memory: Any) -> None:
     R, D = reals(data.efc_R, data.nefc), reals(data.efc_D, data.nefc)
     reference = reals(data.efc_aref, data.nefc)
     for r in range(len(rows) if memory.told and len(rows) == data.nefc else 0):
-        if reference[r] == rows[r].told:
+        if reference[r] == rows[r].told and R[r] == rows[r].R:
             reference[r], R[r] = rows[r].given_reference, rows[r].given_R
             D[r] = 1 / R[r]
     memory.told = 0

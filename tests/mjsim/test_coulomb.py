@@ -648,6 +648,21 @@ def test_rigid_contacts_know_of_dampers_that_are_changed_while_it_runs(joint, in
         assert data.qvel == pytest.approx(plain.qvel, rel=1e-9, abs=1e-15)
 
 
+@pytest.mark.parametrize("rigid", [False, True])
+def test_what_rests_becomes_softer_while_it_runs(rigid):
+    """A weld at rest asks for the same acceleration as in the step before, but gives way more."""
+    weld = '<body name="w" pos="0 0 1" gravcomp="1"><freejoint/><geom size=".1"/></body>'
+    made, data = world(FLOOR + free("box", "1 0 .05", BOX) + weld, more='<equality><weld body1="w"/></equality>')
+    law = Coulomb(made, rigid=rigid)
+    law.step(data, 50)
+    made.eq_solimp[:, :2] = 0.5
+    law.step(data)
+    fresh = mujoco.MjData(made)
+    fresh.qpos[:] = data.qpos
+    mujoco.mj_forward(made, fresh)
+    assert data.efc_R[:6] == pytest.approx(fresh.efc_R[:6], rel=1e-9)
+
+
 @INTEGRATORS
 def test_a_damped_finger_lands_in_a_step(integrator):
     finger = '<joint type="slide" axis="0 0 1" damping="50"/><geom size=".02" mass=".2"/>'
