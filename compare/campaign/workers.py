@@ -263,11 +263,11 @@ def at_most(limit: float) -> Iterator[None]:
     if sys.platform == "win32" or threading.current_thread() is not threading.main_thread():
         yield
         return
-    heard = compiling.listen()
+    heard = compiling.listen(), compiling.here()
 
     def raise_late(*_: object) -> None:
         nonlocal heard
-        last, heard = heard, compiling.listen()
+        last, heard = heard, (compiling.listen(), compiling.here())
         if heard == last and not compiling.here():
             raise LateError(f"it took longer than {limit:g} s")
         signal.setitimer(signal.ITIMER_VIRTUAL, limit)

@@ -90,7 +90,7 @@ def test_what_a_worker_compiles_is_told(soon, capsys):
 def test_compiling_makes_nothing_late():
     with workers.at_most(0.5):
         compiles()
-        works(0.2)
+        works(0.45)
     with pytest.raises(workers.LateError), workers.at_most(0.5):
         works(2.0)
 
