@@ -652,7 +652,9 @@ def test_rigid_contacts_know_of_dampers_that_are_changed_while_it_runs(joint, in
 def test_what_rests_becomes_softer_while_it_runs(rigid):
     """A weld at rest asks for the same acceleration as in the step before, but gives way more."""
     weld = '<body name="w" pos="0 0 1" gravcomp="1"><freejoint/><geom size=".1"/></body>'
-    made, data = world(FLOOR + free("box", "1 0 .05", BOX) + weld, more='<equality><weld body1="w"/></equality>')
+    made, data = world(
+        FLOOR + free("box", "1 0 .05", BOX) + weld, more='<equality><weld body1="w"/></equality>'
+    )
     law = Coulomb(made, rigid=rigid)
     law.step(data, 50)
     made.eq_solimp[:, :2] = 0.5
