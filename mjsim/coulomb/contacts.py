@@ -308,7 +308,7 @@ def square_apart(one: Any, other: Any) -> float:
 def sort_pairs(model: Any, memory: Any) -> None:
     """Sort the contacts by their pairs of geoms; those of one pair keep their order.
 
-    They nearly are: MuJoCo goes through bodies and geoms in their order.
+    They nearly are: MuJoCo goes through pairs of bodies in their order.
     """
     contacts, pairs = contacts_of(memory), pairs_at(memory.pair_at, memory.contacts)
     for i in range(memory.contacts):
@@ -321,9 +321,23 @@ def sort_pairs(model: Any, memory: Any) -> None:
 
 @kernel
 def pair_of(model: Any, contact: Any) -> int:
-    """The pair of geoms of a contact, as one number."""
-    one, other = int(contact.geoms[0]), int(contact.geoms[1])
-    return int(min(one, other) * model.ngeom + max(one, other))
+    """The pair of geoms of a contact, as one number: by the first body, then the second geom."""
+    first, second = min(contact.geoms), max(contact.geoms)
+    body = integers(model.geom_bodyid, model.ngeom)[first]
+    return int((body * model.ngeom + second) * model.ngeom + first)
+
+
+@kernel
+def first_of_pair(memory: Any, pair: int) -> int:
+    """Where the contacts of a pair of geoms begin among those that are sorted."""
+    pairs, low, high = pairs_at(memory.pair_at, memory.contacts), 0, memory.contacts
+    while low < high:
+        middle = (low + high) // 2
+        if pairs[middle].geoms < pair:
+            low = middle + 1
+        else:
+            high = middle
+    return int(low)
 
 
 @kernel
@@ -332,20 +346,12 @@ def nearest(model: Any, memory: Any, old: Any) -> Any:
     has moved, m2; -1 and infinity if there is none. One whose normal lies across isn't the same:
     inner walls of heightfields would inherit what cells bear."""
     contacts, pairs = contacts_of(memory), pairs_at(memory.pair_at, memory.contacts)
-    key, low, high = pair_of(model, old), 0, len(pairs)
-    while low < high:
-        middle = (low + high) // 2
-        if pairs[middle].geoms < key:
-            low = middle + 1
-        else:
-            high = middle
-    best, least = -1, math.inf
-    while low < len(pairs) and pairs[low].geoms == key:
-        contact = contacts[pairs[low].contact]
+    pair, best, least = pair_of(model, old), -1, math.inf
+    for i in range(first_of_pair(memory, pair), first_of_pair(memory, pair + 1)):
+        contact = contacts[pairs[i].contact]
         square = square_apart(contact, old)
         if square < least and dot(contact.normal, old.normal) >= ACROSS:
-            best, least = pairs[low].contact, square
-        low += 1
+            best, least = pairs[i].contact, square
     return best, least
 
 

@@ -28,17 +28,17 @@ def leave_inner_edges_out(model: Any, data: Any, memory: Any) -> bool:
     Returns whether there were any.
     """
     found, left_out, turned = engine_contacts(data.contact, data.ncon), False, False
-    for contact in contacts_of(memory):
-        contact.piece = piece_of(model, contact)
-        contact.steeper = on_hill(model, contact) and is_steeper(model, data, contact)
-    for edge in contacts_of(memory):
+    find_pieces(model, data, memory)
+    contacts, first = contacts_of(memory), integers(memory.first_at, model.ngeom)
+    for edge in contacts:
         hill = on_hill(model, edge)
         if edge.piece < 0 or not (edge.steeper if hill else closes(model, data, memory, edge)):
             continue
-        needed, others = 2 if hill else 1, 0
-        for floor in contacts_of(memory):
-            if others < needed and floor.piece >= 0 and not found[floor.index].exclude:
-                others += makes_inner(model, data, edge, floor, hill)
+        needed, others, k = 2 if hill else 1, 0, first[edge.geoms[1 - edge.piece]]
+        while k >= 0 and others < needed:
+            if not found[contacts[k].index].exclude:
+                others += makes_inner(model, data, edge, contacts[k], hill)
+            k = contacts[k].next
         if others == needed:
             leave_out(data, found[edge.index])
             left_out = True
@@ -48,6 +48,22 @@ def leave_inner_edges_out(model: Any, data: Any, memory: Any) -> bool:
     if turned:
         make_rows_anew(memory)
     return left_out or turned
+
+
+@kernel
+def find_pieces(model: Any, data: Any, memory: Any) -> None:
+    """Find the contacts of each moving geom with what is at rest, and which lean too far."""
+    contacts, first = contacts_of(memory), integers(memory.first_at, model.ngeom)
+    for contact in contacts:
+        contact.piece = piece_of(model, contact)
+        contact.steeper = on_hill(model, contact) and is_steeper(model, data, contact)
+        if contact.piece >= 0:
+            first[contact.geoms[1 - contact.piece]] = -1
+    for k in range(len(contacts) - 1, -1, -1):
+        contact = contacts[k]
+        if contact.piece >= 0:
+            other = contact.geoms[1 - contact.piece]
+            contact.next, first[other] = first[other], k
 
 
 @kernel
@@ -88,12 +104,10 @@ def piece_of(model: Any, contact: Any) -> int:
 
 @kernel
 def lies_below(model: Any, data: Any, edge: Any, floor: Any) -> bool:
-    """Whether the piece to which an edge belongs lies below a contact of the same moving geom with
+    """Whether the piece to which an edge belongs lies below a contact of its moving geom with
     another piece, with another normal. What rolls over the rim of a piece needs both contacts."""
     parallel = abs(dot(edge.frame[0], floor.frame[0])) >= 1 - ALIGNED
     if parallel or same_geoms(edge.geoms, floor.geoms):
-        return False
-    if edge.geoms[1 - edge.piece] != floor.geoms[1 - floor.piece]:
         return False
     up = times_vector(1.0 if floor.piece == 0 else -1.0, floor.frame[0])  # out of the floor
     height = height_above(model, data, edge.geoms[edge.piece], floor.pos, up)

@@ -70,6 +70,7 @@ CONTACT = np.dtype(
         ("moved", _f8),  # square of how far it has moved on its bodies, m2
         ("closes", _i4),  # whether Newton's method has just found that it does
         ("piece", _i4),  # which of its geoms is at rest, if the other one isn't; else -1
+        ("next", _i4),  # the next one of the other geom with what is at rest; -1: it is the last
         ("steeper", _i4),  # whether it is steeper than all cells around of a heightfield
         ("share", _f8),  # part of friction without a limit that it has
     ],
@@ -174,6 +175,7 @@ MEMORY = np.dtype(
         *((f"{name}_at", _i8) for name in ("contact", "before", "row", "jacobian", "column")),
         *((f"{name}_at", _i8) for name in ("dry", "pose", "pair", "xpos", "xmat", "body")),
         *((f"{name}_at", _i8) for name in ("point", "patch", "restitution", "dof")),
+        ("first_at", _i8),  # of each geom, the first of those contacts with what is at rest
         # the island that is solved: how many degrees of freedom and units it has; by their numbers
         # in it, accelerations, those tried, a step to these, what is left of the equations
         ("size", _i8),
@@ -307,6 +309,7 @@ class Simulation:
         record["free_bodies"] = len(self.bodies)
         self._own("point", np.zeros(MJ_CONTACT.itemsize // 8, np.int64))
         self._own("patch", np.zeros(MOST_POINTS * POINT // 8))
+        self._own("first", np.zeros(model.ngeom, np.int32))
         record["bounces"] = len(law.restitution)
         self._own("restitution", np.array(law.restitution, np.float64))
         record["nv"] = nv = model.nv if law.rigid else 0

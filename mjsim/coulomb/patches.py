@@ -8,8 +8,10 @@ from typing import Any
 
 from .compiling import kernel
 from .contacts import (
+    first_of_pair,
     in_world,
     leave_out,
+    pair_of,
     place_of,
     radii,
     read_place,
@@ -33,7 +35,7 @@ from .engine import (
     mjc_Convex,
     reals,
 )
-from .memory import NEW, contacts_at, contacts_of
+from .memory import NEW, contacts_at, contacts_of, pairs_at
 from .parameters import ACROSS, AT_MOST, FARTHEST, FASTER, UNMOVED
 from .rigid import depth_kept
 from .vectors import assign, cross, dot, plus, square_between, times_vector, vector_at
@@ -54,9 +56,11 @@ def put_points_back(model: Any, data: Any, memory: Any) -> int:
             continue
         place_lost_point(model, data, old)
         overlaps = old.gap < 0 and old.moved < (least / 10) ** 2
-        if overlaps and is_lost(data, old, near):
-            add_point(data, memory, old)
-            added += 1
+        if overlaps:
+            found_near, closed, last = look_at_faces(model, data, memory, old, near)
+            if closed and not found_near:
+                add_point(data, memory, old, last)
+                added += 1
     return added
 
 
@@ -101,8 +105,8 @@ def add_points_without_margin(model: Any, data: Any, memory: Any, like: Any) -> 
         like.gap = points[k, 0]
         assign(like.pos, vector_at(points[k], 1))
         assign(like.frame[0], vector_at(points[k], 4))
-        if like.gap < 0 and not has_near(data, like, near):
-            add_point(data, memory, like)
+        if like.gap < 0 and not look_at_faces(model, data, memory, like, near)[0]:
+            add_point(data, memory, like, like.index)
             added += 1
     read_place(like, engine_contacts(data.contact, data.ncon)[like.index])
     return added
@@ -163,14 +167,22 @@ def place_on(model: Any, data: Any, contact: Any, side: int) -> Any:
 
 
 @kernel
-def is_lost(data: Any, old: Any, near: float) -> bool:
-    """Whether the collider has closed points of these two faces, but none near this one: of the
-    corners of a polygon, and of a heightfield, it takes some by turns."""
-    found, closed = engine_contacts(data.contact, data.ncon), False
-    for i in range(data.ncon):
-        if is_of_face(found[i], old):
-            closed, old.index = closed or found[i].dist <= 0, i
-    return bool(closed and not has_near(data, old, near))
+def look_at_faces(model: Any, data: Any, memory: Any, contact: Any, near: float) -> Any:
+    """Of the points of two faces that there are now: whether one is near a contact, whether one is
+    closed, and the number of the last. Of the corners of a polygon, and of a heightfield, the
+    collider takes some by turns."""
+    found, contacts = engine_contacts(data.contact, data.ncon), contacts_of(memory)
+    pair, pairs = pair_of(model, contact), pairs_at(memory.pair_at, memory.contacts)
+    begin, end = first_of_pair(memory, pair), first_of_pair(memory, pair + 1)
+    found_near, closed, last = False, False, -1
+    for i in range(begin, end + data.ncon - memory.ncon):
+        # after them those that the law has added in this step
+        number = contacts[pairs[i].contact].index if i < end else memory.ncon + i - end
+        point = found[number]
+        if is_of_face(point, contact):
+            found_near |= square_between(point.pos, contact.pos) <= near**2
+            closed, last = closed or point.dist <= 0, number
+    return found_near, closed, last
 
 
 @kernel
@@ -182,19 +194,10 @@ def is_of_face(point: Any, contact: Any) -> bool:
 
 
 @kernel
-def has_near(data: Any, contact: Any, near: float) -> bool:
-    """Whether mjData has a point of these two faces near this one."""
-    for point in engine_contacts(data.contact, data.ncon):
-        if square_between(point.pos, contact.pos) <= near**2 and is_of_face(point, contact):
-            return True
-    return False
-
-
-@kernel
-def add_point(data: Any, memory: Any, old: Any) -> None:
-    """Add a lost point to mjData, else as the last of its pair of geoms there is."""
+def add_point(data: Any, memory: Any, old: Any, like: int) -> None:
+    """Add a lost point to mjData, else as one of its pair of geoms that there is."""
     points = engine_contacts(memory.point_at, 1)
-    points[0] = engine_contacts(data.contact, data.ncon)[old.index]
+    points[0] = engine_contacts(data.contact, data.ncon)[like]
     point = points[0]
     set_axes(point.frame, old.frame[0], vector_at(point.frame, 3))
     point.dist = old.gap
