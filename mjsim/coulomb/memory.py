@@ -177,10 +177,12 @@ MEMORY = np.dtype(
         *((f"{name}_at", _i8) for name in ("point", "patch", "restitution", "dof")),
         ("first_at", _i8),  # of each geom, the first of those contacts with what is at rest
         # the island that is solved: how many degrees of freedom and units it has; by their numbers
-        # in it, accelerations, those tried, a step to these, what is left of the equations
+        # in it, accelerations, first ones, those tried, a step to these, what is left of the
+        # equations
         ("size", _i8),
         ("units", _i8),
-        *((f"{name}_at", _i8) for name in ("unit", "island", "tried", "step", "residual")),
+        *((f"{name}_at", _i8) for name in ("unit", "island", "begin", "tried")),
+        *((f"{name}_at", _i8) for name in ("step", "residual")),
         ("local_at", _i8),  # a number for each row of a unit
         *((f"{name}_at", _i8) for name in ("matrix", "place")),
         ("inertia_at", _i8),  # M without what brakes, nC
@@ -314,7 +316,7 @@ class Simulation:
         self._own("restitution", np.array(law.restitution, np.float64))
         record["nv"] = nv = model.nv if law.rigid else 0
         self._own("dof", np.zeros(nv, DOF))
-        for name in ("island", "tried", "step", "residual"):
+        for name in ("island", "begin", "tried", "step", "residual"):
             self._own(name, np.zeros(nv))
         self._own("local", np.zeros(MOST_ROWS))
         self._own("matrix", np.zeros((nv, nv)))

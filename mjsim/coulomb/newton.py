@@ -42,6 +42,7 @@ from .parameters import (
     EXACT,
     FALLING,
     FEWER,
+    FORCED,
     NEAR,
     R_FALLS,
     R_LEAST,
@@ -51,6 +52,7 @@ from .parameters import (
     STEPS,
 )
 from .rows import find_residuals, hold
+from .vectors import assign
 
 # -- forces and their derivatives ------------------------------------------------------------------
 
@@ -270,11 +272,12 @@ def substitute(matrix: Any, dofs: Any, x: Any) -> None:
 @kernel
 def solve_island(model: Any, data: Any, memory: Any, exactness: float) -> bool:
     """Newton's method for the accelerations of the island, to a part of the forces without
-    contacts; whether it came to an end."""
-    dofs, size = dofs_of(memory), memory.size
+    contacts; whether it came to an end, else they are what they were."""
+    dofs, size, forced = dofs_of(memory), memory.size, 0
     matrix, step = reals(memory.matrix_at, (size, size)), reals(memory.step_at, size)
     a, tried = reals(memory.island_at, size), reals(memory.tried_at, size)
-    residual = reals(memory.residual_at, size)
+    residual, begin = reals(memory.residual_at, size), reals(memory.begin_at, size)
+    assign(begin, a)
     enough = exactness * forces_without_contacts(model, data, memory)
     square = find_residual(model, data, memory, a)
     for _ in range(STEPS):
@@ -293,8 +296,11 @@ def solve_island(model: Any, data: Any, memory: Any, exactness: float) -> bool:
             if square <= (1 - DECREASE * share) ** 2 * before or share < SHORTEST:
                 break
             share *= FEWER
-        for k in range(size):
-            a[k] = tried[k]
+        assign(a, tried)
+        forced += share < SHORTEST
+        if forced > FORCED:
+            break
+    assign(a, begin)
     return False
 
 

@@ -114,6 +114,9 @@ for four."""
 FEWER, DECREASE, SHORTEST = 0.5, 1e-4, 1e-3
 """By what a Newton step is shortened; by how much, relative to its length, the residual must fall;
 the shortest."""
+FORCED = 2
+"""Newton steps that may be the shortest although the residual doesn't fall: after more it comes to
+no end."""
 SOFTER = 128.0
 """How much larger R is in a step that Newton's method solves, which holds forces until contacts
 give way no more."""
