@@ -150,6 +150,34 @@ def heap(count: int, seed: int) -> Any:
     return world(FLOOR + bodies, more='<size memory="50M"/>')
 
 
+def bin_of_balls(seed: int) -> Any:
+    """64 balls that fall into a bin."""
+    rng, balls = np.random.default_rng(seed), ""
+    for k in range(64):
+        x, y = 0.11 * np.array([k % 4 - 1.5, k // 4 % 4 - 1.5]) + rng.uniform(-5e-3, 5e-3, 2)
+        balls += free(f"b{k}", f"{x} {y} {0.06 + 0.11 * (k // 16)}", BALL)
+    walls = (
+        f'<geom type="plane" size="9 9 1" zaxis="{x} {y} 0" pos="{-0.25 * x} {-0.25 * y} 0"/>'
+        for x, y in ((1, 0), (-1, 0), (0, 1), (0, -1))
+    )
+    return world(FLOOR + "".join(walls) + balls, more='<size memory="50M"/>')
+
+
+def on(floor: str, more: str = "") -> Any:
+    """64 boxes on a floor 2.5 m wide."""
+    places = itertools.product(0.3 * np.arange(8), repeat=2)
+    boxes = (free(f"b{k}", f"{x} {y} .06", BOX) for k, (x, y) in enumerate(places))
+    return world(floor + "".join(boxes), more=more + '<size memory="50M"/>')
+
+
+TILES = "".join(
+    f'<geom type="box" size=".125 .125 .05" pos="{0.25 * i} {0.25 * j} -.05"/>'
+    for i, j in itertools.product(range(10), repeat=2)
+)
+FIELD = '<geom type="hfield" hfield="flat" pos="1.05 1.05 0"/>'
+CELLS = '<asset><hfield name="flat" nrow="51" ncol="51" size="1.25 1.25 1 .1"/></asset>'
+
+
 def cost(
     model: Any, way: Way, begin: Callable[[Any, Stepper], None], rounds: int, steps: int
 ) -> float:
@@ -162,14 +190,14 @@ def cost(
     return float(np.median(times[:, 1] / times[:, 0]))
 
 
-def at_rest(count: int, way: Way) -> float:
-    """Cost of a step at rest with so many contacts, to which each comes by itself."""
+def at_rest(model: Any, steps: int, way: Way) -> float:
+    """Cost of a step at rest, to which each comes by itself."""
 
     def begin(data: Any, stepper: Stepper) -> None:
         if data.time == 0:
             stepper.step(data, 1500)
 
-    return cost(columns(count), way, begin, 15, max(3000 // count, 40))
+    return cost(model, way, begin, 15, steps)
 
 
 def moving(model: Any, rounds: int, steps: int, speed: float, way: Way) -> float:
@@ -183,20 +211,24 @@ def moving(model: Any, rounds: int, steps: int, speed: float, way: Way) -> float
     return cost(model, way, begin, rounds, steps)
 
 
-def falling(count: int, way: Way) -> list[float]:
+def falling(heap: Callable[[int], Any], way: Way) -> list[float]:
     """Cost of a step of several heaps."""
-    return [moving(heap(count, seed), 1, FALL, 0.0, way) for seed in range(HEAPS)]
+    return [moving(heap(seed), 1, FALL, 0.0, way) for seed in range(HEAPS)]
 
 
 def costs() -> Rows:
     """What a step costs, in units of plain MuJoCo's."""
     doors = {"soft": SOFT, "soft, installed": Way(Installed), "rigid": RIGID}
     scenes: dict[str, Callable[[Way], float | list[float]]] = {
-        f"at rest, {n} contacts": partial(at_rest, n) for n in (1, 12, 52, 200, 1000)
+        f"at rest, {n} contacts": partial(at_rest, columns(n), max(3000 // n, 40))
+        for n in (1, 12, 52, 200, 1000)
     }
+    scenes["64 boxes on tiles"] = partial(at_rest, on(TILES), 40)
+    scenes["64 boxes on a heightfield"] = partial(at_rest, on(FIELD, CELLS), 40)
     scenes["a box that slides"] = partial(moving, one(BOX, 0.25, 20), 15, 500, 1.0)
     for n in (8, 27, 64, 216):
-        scenes[f"falling heap of {n} boxes"] = partial(falling, n)
+        scenes[f"falling heap of {n} boxes"] = partial(falling, partial(heap, n))
+    scenes["64 balls that fall into a bin"] = partial(falling, bin_of_balls)
     rows = [["cost of a step", *doors]]
     for name, measure in scenes.items():
         ways_of_it = [SOFT] if name.startswith(LONG) else doors.values()
@@ -308,8 +340,9 @@ def landing() -> Rows:
         f"rigid, restitution {e:g}": Way(partial(Coulomb, rigid=True, restitution=e))
         for e in (0.5, 0.9, 1.0)
     }
-    bodies = {"box": BOX, "ball": BALL}.items()
-    for (name, geom), (how, way) in itertools.product(bodies, (THREE | bounce).items()):
+    boxes = [("box", BOX, how, way) for how, way in THREE.items()]
+    balls = [("ball", BALL, how, way) for how, way in (THREE | bounce).items()]
+    for name, geom, how, way in boxes + balls:
         data, stepper = start(one(geom, height=0.25), way)
         heights, speeds = [0.2], [0.0]
         for _ in range(500):
