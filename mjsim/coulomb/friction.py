@@ -167,28 +167,31 @@ def feedback(rows: Any, contact: Any) -> float:
 
 @kernel
 def predict_slip(model: Any, data: Any, memory: Any) -> bool:
-    """Predict slip, as if accelerations stayed those of the last step; whether that is in doubt."""
-    doubt, rigid = False, memory.law.rigid
+    """Predict slip, as if accelerations stayed those of the last step; whether that is in doubt: it
+    makes islands due."""
+    doubt, rigid = 0, memory.law.rigid
     find_residuals(memory, reals(data.qacc, model.nv), False)
     for contact in contacts_of(memory):
         rows = rows_of_contact(memory, contact)
         slip, normal = shift(rows, contact), rows[0].residual
         contact.predicted, contact.extrapolated = slip, -1.0
         if contact.state == NEW or contact.state == OPEN:
-            doubt |= normal < 0 and (rigid or slip > memory.enough)
+            contact.due = normal < 0 and (rigid or slip > memory.enough)
+            doubt |= contact.due
             continue
         if contact.state == STICKS or power(rows) >= 0:  # it stops
             contact.predicted = 0.0
-            doubt |= slip > memory.enough and not would_hold(rows, contact)
+            contact.due = slip > memory.enough and not would_hold(rows, contact)
         else:
             contact.extrapolated = slip
             contact.predicted = max(slip + contact.bias, 0.0)
             surely = STEADIER if rigid and feedback(rows, contact) > FEEDBACK else 1.0
-            doubt |= contact.error > memory.enough * surely
+            contact.due = contact.error > memory.enough * surely
         # the force of a rigid contact will change by a weight
         changes = abs(normal) > memory.gravity or (contact.predicted == 0 and slip > memory.gravity)
-        doubt |= rigid and changes
-    return doubt
+        contact.due |= rigid and changes
+        doubt |= contact.due
+    return bool(doubt)
 
 
 @kernel

@@ -10,7 +10,7 @@ from typing import Any
 
 from .compiling import kernel
 from .engine import integers
-from .memory import CONTACT_ROW, OPEN, columns_of, contacts_of, dofs_of, places_of, rows_of
+from .memory import CONTACT_ROW, columns_of, contacts_of, dofs_of, places_of, rows_of
 from .parameters import BLOCK
 
 
@@ -27,21 +27,21 @@ def find_units(memory: Any) -> None:
 
 
 @kernel
-def find_islands(model: Any, memory: Any, everywhere: bool) -> None:
-    """Find the islands of degrees of freedom that units or joints connect.
+def find_islands(model: Any, memory: Any) -> None:
+    """Find the islands of degrees of freedom that units or joints connect, and those that contacts
+    make due.
 
-    Open contacts connect none, but belong to the island in which they are, if it is one. Those
-    islands are due in which a contact has just closed; or all, `everywhere`.
+    Open contacts connect none, but belong to the island in which they are, if it is one.
     """
     rows, contacts, dofs = rows_of(memory), contacts_of(memory), dofs_of(memory)
     parent = integers(model.dof_parentid, model.nv)
     for i in range(model.nv):
         dofs[i].label = root(dofs, parent[i]) if parent[i] >= 0 else i
         dofs[i].tree = dofs[parent[i]].tree if parent[i] >= 0 else i
-        dofs[i].next, dofs[i].unit, dofs[i].due = -1, -1, everywhere
+        dofs[i].next, dofs[i].unit, dofs[i].due = -1, -1, 0
     for row in rows:
         column = columns_of(memory, row)
-        connects = row.dim > 0 and (row.contact < 0 or contacts[row.contact].state != OPEN)
+        connects = row.dim > 0 and (row.contact < 0 or contacts[row.contact].closed)
         for n in range(len(column) if connects else 0):
             one, other = root(dofs, column[0]), root(dofs, column[n])
             dofs[max(one, other)].label = min(one, other)
@@ -55,8 +55,19 @@ def find_islands(model: Any, memory: Any, everywhere: bool) -> None:
         if rows[u].dim > 0 and in_one_island(dofs, column):
             island = dofs[dofs[column[0]].label]
             rows[u].next, island.unit = island.unit, u
-            if rows[u].contact >= 0:
-                island.due |= contacts[rows[u].contact].closes
+    for contact in contacts:
+        column = columns_of(memory, rows[contact.address])
+        if contact.due and len(column) > 0:  # the first and the last are of both bodies
+            dofs[dofs[column[0]].label].due = dofs[dofs[column[-1]].label].due = 1
+
+
+@kernel
+def in_due_island(memory: Any, contact: Any) -> bool:
+    """Whether one of the islands that a contact moves is to be solved."""
+    dofs, column = dofs_of(memory), columns_of(memory, rows_of(memory)[contact.address])
+    if len(column) == 0:
+        return False
+    return bool(dofs[dofs[column[0]].label].due or dofs[dofs[column[-1]].label].due)
 
 
 @kernel

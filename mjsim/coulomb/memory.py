@@ -68,7 +68,9 @@ CONTACT = np.dtype(
         ("mu", _f8, 5),  # coefficients of friction: two of sliding, of spin, two of rolling, m
         ("cone", _f8),  # MuJoCo's regular coefficient, of the cone in scaled forces
         ("moved", _f8),  # square of how far it has moved on its bodies, m2
-        ("closes", _i4),  # whether Newton's method has just found that it does
+        # in Newton's method: whether it counts as closed, whether its island is to be solved, and
+        # whether that was solved in this step
+        *((name, _i4) for name in ("closed", "due", "solved")),
         ("piece", _i4),  # which of its geoms is at rest, if the other one isn't; else -1
         ("next", _i4),  # the next one of the other geom with what is at rest; -1: it is the last
         ("steeper", _i4),  # whether it is steeper than all cells around of a heightfield

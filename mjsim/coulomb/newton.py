@@ -21,7 +21,7 @@ import numpy as np
 from .compiling import kernel
 from .engine import integers, reals
 from .friction import shift
-from .islands import find_islands, find_units, number_island
+from .islands import find_islands, find_units, in_due_island, number_island
 from .memory import (
     DRY,
     ONE_SIDED,
@@ -49,6 +49,7 @@ from .parameters import (
     R_RISES,
     ROUGH,
     SHORTEST,
+    SOFTER,
     STEPS,
 )
 from .rows import find_residuals, hold
@@ -329,8 +330,8 @@ def hold_forces(memory: Any) -> float:
 
 @kernel
 def solve_contacts(model: Any, data: Any, memory: Any, a: Any, scale: float) -> bool:
-    """Solve for the accelerations `a` with contacts that close, until none closes that was open;
-    each island begins with `scale` times R.
+    """Solve for the accelerations `a` of islands that contacts make due, with contacts that close,
+    until none closes that was open; each island begins with `scale` times R.
 
     Slip that is predicted, and forces that are held, are those that it comes to. Returns whether it
     came to an end.
@@ -338,32 +339,38 @@ def solve_contacts(model: Any, data: Any, memory: Any, a: Any, scale: float) -> 
     find_residuals(memory, a, True)
     for contact in contacts_of(memory):
         normal = rows_of_contact(memory, contact)[0]
-        contact.state = STICKS if normal.residual < 0 or normal.held > 0 else OPEN
-    for n in range(memory.law.most):
-        if not solve_closed(model, data, memory, a, n == 0, scale):
+        contact.closed = normal.residual < 0 or normal.held > 0
+    for _ in range(memory.law.most):
+        if not solve_closed(model, data, memory, a, scale):
             return False
         find_residuals(memory, a, True)
         some = False
         for contact in contacts_of(memory):
-            rows, was_open = rows_of_contact(memory, contact), contact.state == OPEN
+            rows, was_open, contact.due = rows_of_contact(memory, contact), not contact.closed, 0
+            if not in_due_island(memory, contact):
+                continue
             contact.state = contact_forces(rows, contact)
-            contact.closes = was_open and contact.state != OPEN
+            contact.closed = contact.state != OPEN
+            contact.due = was_open and contact.closed
             contact.predicted = shift(rows, contact) if contact.state != STICKS else 0.0
             contact.extrapolated = -1.0
-            some = some or contact.closes
+            some = some or contact.due
         if not some:
             return True
     return False
 
 
 @kernel
-def solve_closed(
-    model: Any, data: Any, memory: Any, a: Any, everywhere: bool, scale: float
-) -> bool:
-    """Solve for the accelerations of islands of closed contacts, `everywhere` or where one has just
-    closed; whether all came to an end."""
+def solve_closed(model: Any, data: Any, memory: Any, a: Any, scale: float) -> bool:
+    """Solve for the accelerations of islands that are due; whether all came to an end. Their
+    contacts become softer, once in a step: in a solution they come to hold what they bear."""
     find_units(memory)
-    find_islands(model, memory, everywhere)
+    find_islands(model, memory)
+    for contact in contacts_of(memory):
+        softens = in_due_island(memory, contact) and not contact.solved
+        for row in rows_of_contact(memory, contact):
+            row.R *= SOFTER if softens else 1.0
+        contact.solved |= softens
     dofs, own, solved = dofs_of(memory), reals(memory.island_at, memory.nv), True
     for first in range(model.nv):
         if solved and dofs[first].label == first and dofs[first].due:

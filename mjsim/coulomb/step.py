@@ -10,7 +10,7 @@ from .compiling import kernel
 from .engine import datas, mj_fwdAcceleration, mj_fwdActuation, mj_fwdConstraint, models, reals
 from .memory import contacts_of, memories, rows_of, rows_of_contact
 from .newton import solve_contacts
-from .parameters import EARTH, NEXT, OVER, R_LEAST, SOFTER
+from .parameters import EARTH, NEXT, OVER, R_LEAST
 from .vectors import dot
 
 
@@ -188,20 +188,23 @@ def solve(model: Any, data: Any, memory: Any, known: bool) -> None:
     if memory.law.rigid:
         if not known:  # loads that contacts can bear in many ways are shared as MuJoCo has it
             iterate(model, data, memory, start)
-        solved = solve_rigid(model, data, memory, start)
+        solved = solve_rigid(model, data, memory, start, known)
     if not solved:
         solved = iterate(model, data, memory, start)
     memory.unsolved += not solved
 
 
 @kernel
-def solve_rigid(model: Any, data: Any, memory: Any, start: Any) -> bool:
-    """Find slip and forces by Newton's method; friction at mid step asks for a solution more, once
-    it is known what slips."""
-    soften(memory)
+def solve_rigid(model: Any, data: Any, memory: Any, start: Any, known: bool) -> bool:
+    """Find slip and forces by Newton's method, in islands where a contact is in doubt; friction at
+    mid step asks for a solution more, once it is known what slips."""
+    for contact in contacts_of(memory):
+        contact.solved, contact.due = 0, contact.due or not known
     solved = solve_contacts(model, data, memory, start, 1.0)
     rows.find_residuals(memory, start, False)
     if rigid.oppose_slip_at_mid_step(model, memory):
+        for contact in contacts_of(memory):
+            contact.due = contact.solved
         solved &= solve_contacts(model, data, memory, start, R_LEAST)
     friction.extrapolate_slip(model, data, memory)
     return bool(solved)
@@ -227,11 +230,3 @@ def iterate(model: Any, data: Any, memory: Any, start: Any) -> bool:
         if worst <= memory.enough:
             return True
     return False
-
-
-@kernel
-def soften(memory: Any) -> None:
-    """Make contacts softer, for a solution in which they come to hold what they bear."""
-    for contact in contacts_of(memory):
-        for row in rows_of_contact(memory, contact):
-            row.R *= SOFTER
