@@ -665,6 +665,19 @@ def test_what_rests_becomes_softer_while_it_runs(rigid):
     assert data.efc_R[:6] == pytest.approx(fresh.efc_R[:6], rel=1e-9)
 
 
+def test_only_islands_in_doubt_are_solved():
+    """Where a box tumbles; not where another one rests."""
+    made, data = world(FLOOR + free("rests", "0 0 .05", BOX) + free("tumbles", "1 0 1.5", BOX))
+    law, solved = Coulomb(made, rigid=True), np.zeros(2, int)
+    data.qpos[10:14] = 0.8, 0.3, 0.4, 0.33
+    for step in range(500):
+        law.step(data)
+        for contact in law._simulation(data)._array("contact")[: data.ncon] if step > 100 else ():
+            solved[made.geom_bodyid[contact["geoms"][1]] - 1] += contact["solved"]
+    assert solved[0] == 0
+    assert solved[1] > 5
+
+
 @INTEGRATORS
 def test_a_damped_finger_lands_in_a_step(integrator):
     finger = '<joint type="slide" axis="0 0 1" damping="50"/><geom size=".02" mass=".2"/>'
