@@ -228,7 +228,7 @@ def costs() -> Rows:
     scenes["a box that slides"] = partial(moving, one(BOX, 0.25, 20), 15, 500, 1.0)
     for n in (8, 27, 64, 216):
         scenes[f"falling heap of {n} boxes"] = partial(falling, partial(heap, n))
-    scenes["64 balls that fall into a bin"] = partial(falling, bin_of_balls)
+    scenes["64 balls in a bin"] = partial(falling, bin_of_balls)
     rows = [["cost of a step", *doors]]
     for name, measure in scenes.items():
         ways_of_it = [SOFT] if name.startswith(LONG) else doors.values()
