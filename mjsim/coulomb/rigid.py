@@ -227,8 +227,7 @@ def take_depth_away(model: Any, data: Any, memory: Any) -> None:
 
 @kernel
 def oppose_slip_at_mid_step(model: Any, memory: Any) -> bool:
-    """Let friction of what slides fast oppose its slip at mid step; whether there is any. If its
-    island was solved in the step, that is due again.
+    """Let friction of what slides fast oppose its slip at mid step; whether there is any.
 
     That is of second order, by the Jacobian of where bodies are: velocities lie half a step to
     either side. Where slip may end within the step, it must oppose that at the end, and in an
@@ -236,7 +235,7 @@ def oppose_slip_at_mid_step(model: Any, memory: Any) -> bool:
     """
     h, some = model.opt.timestep, False
     for contact in contacts_of(memory):
-        rows, contact.due = rows_of_contact(memory, contact), 0
+        rows = rows_of_contact(memory, contact)
         gained = rows[0].remembered - contact.load
         impact = abs(gained) * rows[0].estimate > memory.gravity
         if contact.state != SLIDES or contact.predicted == 0 or impact:
@@ -255,7 +254,7 @@ def oppose_slip_at_mid_step(model: Any, memory: Any) -> bool:
             row.residual += more
         contact.extrapolated = shift(rows, contact)
         contact.predicted = max(contact.extrapolated + contact.bias, 0.0)
-        contact.due, some = contact.solved, True
+        some = True
     return some
 
 

@@ -203,6 +203,8 @@ def solve_rigid(model: Any, data: Any, memory: Any, start: Any, known: bool) -> 
     solved = solve_contacts(model, data, memory, start, 1.0)
     rows.find_residuals(memory, start, False)
     if rigid.oppose_slip_at_mid_step(model, memory):
+        for contact in contacts_of(memory):
+            contact.due = contact.solved
         solved &= solve_contacts(model, data, memory, start, R_LEAST)
     friction.extrapolate_slip(model, data, memory)
     return bool(solved)
