@@ -268,7 +268,7 @@ def at_most(limit: float) -> Iterator[None]:
     def raise_late(*_: object) -> None:
         nonlocal heard
         last, heard = heard, (compiling.listen(), compiling.here())
-        if heard == last and not compiling.here():
+        if heard == last and not heard[1]:
             raise LateError(f"it took longer than {limit:g} s")
         signal.setitimer(signal.ITIMER_VIRTUAL, limit)
 

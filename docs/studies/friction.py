@@ -211,9 +211,9 @@ def moving(model: Any, rounds: int, steps: int, speed: float, way: Way) -> float
     return cost(model, way, begin, rounds, steps)
 
 
-def falling(heap: Callable[[int], Any], way: Way) -> list[float]:
-    """Cost of a step of several heaps."""
-    return [moving(heap(seed), 1, FALL, 0.0, way) for seed in range(HEAPS)]
+def falling(build: Callable[[int], Any], way: Way) -> list[float]:
+    """Cost of a step of several heaps, each built by its seed."""
+    return [moving(build(seed), 1, FALL, 0.0, way) for seed in range(HEAPS)]
 
 
 def costs() -> Rows:

@@ -367,10 +367,10 @@ def solve_closed(model: Any, data: Any, memory: Any, a: Any, scale: float) -> bo
     find_units(memory)
     find_islands(model, memory)
     for contact in contacts_of(memory):
-        softens = in_due_island(memory, contact) and not contact.solved
-        for row in rows_of_contact(memory, contact):
-            row.R *= SOFTER if softens else 1.0
-        contact.solved |= softens
+        if in_due_island(memory, contact) and not contact.solved:
+            contact.solved = 1
+            for row in rows_of_contact(memory, contact):
+                row.R *= SOFTER
     dofs, own, solved = dofs_of(memory), reals(memory.island_at, memory.nv), True
     for first in range(model.nv):
         if solved and dofs[first].label == first and dofs[first].due:
